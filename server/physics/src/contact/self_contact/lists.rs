@@ -18,7 +18,7 @@ const FOR_EVER_M: f64 = 1e6;
 pub(super) struct Pair {
     pub(super) node: u32,
     pub(super) triangle: u32,
-    /// How far (m) the surface has to have moved since the query before they can be within the vertex's reach.
+    /// How far (m) the surface has to have moved since the query before they can matter.
     pub(super) free_m: f64,
 }
 
@@ -153,9 +153,16 @@ impl NearWalls {
     }
 
     /// Sorts the pairs, so that sums have the same bits whenever they were listed, which serve while the surface moves no
-    /// more than `slack_m` (m).
-    pub(super) fn finish(&mut self, slack_m: f64) {
-        self.pairs[..self.count].sort_unstable_by_key(|pair| (pair.node, pair.triangle));
+    /// more than `slack_m` (m). `later` tells of all pairs of a vertex how far (m) at least the surface has to move before any of them matters.
+    pub(super) fn finish(&mut self, slack_m: f64, later: impl Fn(&[Pair]) -> f64) {
+        let pairs = &mut self.pairs[..self.count];
+        pairs.sort_unstable_by_key(|pair| (pair.node, pair.triangle));
+        for of_vertex in pairs.chunk_by_mut(|one, next| one.node == next.node) {
+            let free_m = later(of_vertex);
+            for pair in of_vertex {
+                pair.free_m = pair.free_m.max(free_m);
+            }
+        }
         self.slack_m = slack_m.min(FOR_EVER_M);
         self.whole_slack_m = self.slack_m;
         self.awake_m = AWAKE * self.whole_slack_m;

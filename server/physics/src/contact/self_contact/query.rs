@@ -10,7 +10,7 @@
 //! phase has it, so what is `r + 2 d` apart cannot meet within a travel of `d`.
 use super::{
     lists::{NearWalls, Pair},
-    rest::{ClusterAtRest, SelfContact},
+    rest::{ClusterAtRest, SelfContact, twice_area_m2},
 };
 use crate::contact::{
     broad::{self, CLUSTER, ROUNDING_M, box_distance_m},
@@ -21,6 +21,10 @@ use glam::DVec3;
 /// Size of a cluster over that at rest from which it is torn. In a step that was too long and will be repeated, the body may
 /// be anywhere, and would be looked at vertex by vertex for seconds.
 const TORN: f64 = 8.0;
+/// By how much a height over a plane may fall more than the plane's corners and the point tell, since the plane turns.
+const TURNING: f64 = 1.1;
+/// Way of a triangle's corners over its least height while which its plane turns by no more than 25°.
+const TURNS_WITHIN: f64 = 0.2;
 /// Number of clusters that are ruled out together.
 const GROUP: usize = broad::GROUP / CLUSTER;
 
@@ -98,7 +102,7 @@ impl SelfContact {
         near.clear();
         if exhaustive {
             self.list_all(x, near);
-            near.finish(0.0);
+            near.finish(0.0, |_| f64::NEG_INFINITY);
             return;
         }
         for (cluster, now) in scratch.clusters.iter_mut().enumerate() {
@@ -112,7 +116,7 @@ impl SelfContact {
         let slack_m = (0..self.clusters.len())
             .map(|cluster| f64::min(self.look_close(cluster, &mut query), self.look_far(cluster, &mut query)))
             .fold(f64::INFINITY, f64::min);
-        near.finish(slack_m - ROUNDING_M);
+        near.finish(slack_m - ROUNDING_M, |of_vertex| self.later_m(of_vertex, x));
     }
 
     fn cluster_now(&self, cluster: usize, x: &[DVec3]) -> ClusterNow {
@@ -269,6 +273,32 @@ impl SelfContact {
                 }
             }
         }
+    }
+
+    /// Returns how far (m) the surface has to move before a vertex with these pairs may be pressed: before it is within its margin
+    /// of a triangle or, as at a rim, of the plane of one. With the weights `β` of its foot on the plane, its height falls by no more than
+    /// `1 + Σ |β_i|` times that over the cosine by which the plane turns, which is little while its corners move by no more than a part
+    /// of the triangle's least height. −∞ where it may be pressed already.
+    fn later_m(&self, of_vertex: &[Pair], x: &[DVec3]) -> f64 {
+        let Some(first) = of_vertex.first() else { return f64::NEG_INFINITY };
+        let (y, margin_m) = (x[first.node as usize], self.nodes[first.node as usize].margin_m);
+        let of_pair_m = |pair: &Pair| {
+            let corners = self.triangles.corners(pair.triangle as usize, x);
+            let (area, from) = (twice_area_m2(corners), y - corners[0]);
+            let area_sq = area.length_squared();
+            let wb = from.cross(corners[2] - corners[0]).dot(area) / area_sq;
+            let wc = (corners[1] - corners[0]).cross(from).dot(area) / area_sq;
+            let falls = TURNING * (1.0 + (1.0 - wb - wc).abs() + wb.abs() + wc.abs());
+            let height_m = from.dot(area) / area_sq.sqrt();
+            let longest_m = corners[0]
+                .distance(corners[1])
+                .max(corners[1].distance(corners[2]).max(corners[2].distance(corners[0])));
+            let turns_m = TURNS_WITHIN * area_sq.sqrt() / longest_m;
+            f64::min(0.5 * (self.distance_m(y, pair.triangle as usize, x) - margin_m), (height_m - margin_m) / falls)
+                .min(turns_m)
+        };
+        let least_m = of_vertex.iter().map(of_pair_m).fold(f64::INFINITY, f64::min) - ROUNDING_M;
+        if least_m > 0.0 { least_m } else { f64::NEG_INFINITY }
     }
 
     fn distance_m(&self, y: DVec3, triangle: usize, x: &[DVec3]) -> f64 {

@@ -188,6 +188,43 @@ fn queries_lose_nothing_that_is_within_reach() {
     assert!(met > 100, "{met}");
 }
 
+/// A list that has served for some way presses to the last bit what one that is made anew does, from before walls meet until they overlap.
+#[test]
+fn what_does_not_matter_yet_is_not_pressed_either() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let (mut pressed_some, mut passed_over) = (0, 0);
+    for seed in 0..60 {
+        let x = bent(&mesh, 1e-3 + 4e-5 * seed as f64, 1e-4, seed + 1);
+        let list = walls.near_at(&x);
+        for way in [0.05, 0.3, 0.9] {
+            let moved_m = way * list.slack_m;
+            let mut random = Random(seed + 100);
+            // Each by so much at most, towards each other where it is the other wall's.
+            let moved: Vec<DVec3> = x
+                .iter()
+                .map(|p| {
+                    let towards = DVec3::Z * -(p.z - 0.01).signum() * 3.0;
+                    *p + (random.vector() + towards).clamp_length_max(1.0) * moved_m
+                })
+                .collect();
+            let mut near = list.clone();
+            near.slack_m -= moved_m;
+            let (mut forces_n, mut scratch) = (vec![DVec3::ZERO; x.len()], walls.scratch());
+            walls.press(&moved, &near, &mut forces_n, &mut scratch);
+            let (anew_n, seen) = pressed(&walls, &moved);
+            for (node, (here, anew)) in forces_n.iter().zip(&anew_n).enumerate() {
+                assert_eq!(here, anew, "seed {seed}, node {node}, moved {moved_m} m");
+            }
+            assert_eq!(scratch.seen(), seen);
+            pressed_some += u32::from(seen.vertices > 0);
+            passed_over += near.pairs().iter().filter(|pair| pair.free_m > near.moved_m()).count();
+        }
+    }
+    println!("{pressed_some} of 180 press, {passed_over} pairs were passed over");
+    assert!(pressed_some > 60 && passed_over > 1000, "{pressed_some} {passed_over}");
+}
+
 /// A clamp of several groups of clusters, whose one arm slides back along the other by half its length and into it: what
 /// meets is not close at rest.
 #[test]
