@@ -161,7 +161,7 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
-            skin_influence: SkinInfluence::new(&skin_carriers, masses.node_kg.len()),
+            skin_influence: SkinInfluence::new(&skin_carriers, masses.node_kg.len(), spec.fine_depth_m.is_none()),
             skin_carriers,
             vertex_points,
             clusters: SkinClusters::default(),
@@ -284,7 +284,7 @@ impl HybridBody {
 
     /// Returns a bound of the speed of any vertex of the skin over that of the fastest node or particle.
     pub(crate) fn amplification(&self) -> f64 {
-        self.skin_influence.amplification()
+        self.skin_influence.largest_amplification()
     }
 
     /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.

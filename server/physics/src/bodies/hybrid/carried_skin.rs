@@ -60,11 +60,32 @@ impl<'a> SkinView<'a> {
         }
     }
 
+    /// Returns the position (m) of a vertex when its carriers were noted.
+    fn position_then_m(&self, vertex: u32, then: &CarriersThen) -> DVec3 {
+        let carriers = &self.hybrid.skin_carriers;
+        let active = then.particles_m();
+        let of = |particle: u32| match active.binary_search_by_key(&particle, |(particle, _)| *particle) {
+            Ok(number) => active[number].1,
+            Err(_) => carriers.anchor(particle).of(then.nodes_m()),
+        };
+        let moved: DVec3 = carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum();
+        self.hybrid.skin_rest_m()[vertex as usize] + moved
+    }
+
+    /// Returns a bound of the speed (m/s) of any vertex.
+    pub(super) fn fastest_m_per_s(&self) -> f64 {
+        let (of_nodes, of_particles) = self.v.split_at(self.hybrid.node_count());
+        let particles_sq = of_particles.iter().map(|v| v.length_squared()).fold(0.0, f64::max);
+        let influence = &self.hybrid.skin_influence;
+        let tame_m_per_s = influence.bound(|node| of_nodes[node].length_squared(), particles_sq);
+        let wild_m_per_s = |&vertex: &u32| self.velocity_m_per_s(vertex).length();
+        influence.wild().iter().map(wild_m_per_s).fold(tame_m_per_s, f64::max)
+    }
+
     fn displaced(&self, by_particles: bool) -> Displaced<'_> {
         Displaced {
             displacements_m: self.patch.node_displacements_m(),
             deviation_m: if by_particles { self.deviation_m } else { 0.0 },
-            amplification: self.hybrid.amplification(),
         }
     }
 }
@@ -134,7 +155,9 @@ impl Skin for SkinView<'_> {
         }
         earlier.for_each(fell_asleep);
         let node_sq = |node: usize| nodes_m[node].distance_squared(then.nodes_m()[node]);
-        self.hybrid.skin_influence.bound(node_sq, f64::max(asleep_sq, active_sq))
+        let tame_m = self.hybrid.skin_influence.bound(node_sq, f64::max(asleep_sq, active_sq));
+        let wild_m = |&vertex: &u32| (self.position_m(vertex) - self.position_then_m(vertex, then)).length();
+        self.hybrid.skin_influence.wild().iter().map(wild_m).fold(tame_m, f64::max)
     }
 }
 
@@ -206,14 +229,6 @@ impl CarriedSkin for SkinView<'_> {
 }
 
 impl HybridBody {
-    /// Returns a bound of the speed (m/s) of any vertex of the skin, at velocities `v` (m/s) of coarse nodes and then of
-    /// active particles.
-    pub(crate) fn fastest_of_skin_m_per_s(&self, v: &[DVec3]) -> f64 {
-        let (of_nodes, of_particles) = v.split_at(self.node_count());
-        let particles_sq = of_particles.iter().map(|v| v.length_squared()).fold(0.0, f64::max);
-        self.skin_influence.bound(|node| of_nodes[node].length_squared(), particles_sq)
-    }
-
     /// Returns the position (m) of a vertex of the skin, at positions `x` (m) of coarse nodes and then of the active
     /// particles `active`.
     pub fn vertex_m(&self, vertex: u32, active: &[u32], x: &[DVec3]) -> DVec3 {

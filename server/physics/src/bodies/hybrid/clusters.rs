@@ -8,7 +8,7 @@
 //! x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```
 //! The last term is left out where no active particle carries a vertex.
-use super::body::HybridBody;
+use super::{body::HybridBody, skin_influence::amplification};
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -29,6 +29,8 @@ struct Boxes {
     /// Index in `nodes` of the first entry of each box, and the end of the last.
     first: Vec<u32>,
     nodes: Vec<u32>,
+    /// `a` of each.
+    amplification: Vec<f64>,
     /// Index in `vertices` of the first entry of each cluster, and the end of the last; empty for groups.
     first_vertex: Vec<u32>,
     vertices: Vec<u32>,
@@ -105,8 +107,6 @@ pub(super) struct Displaced<'a> {
     pub(super) displacements_m: &'a [DVec3],
     /// `max |d_p|` (m); 0 for clusters of which no active particle carries a vertex.
     pub(super) deviation_m: f64,
-    /// `a`, the bound of `Σ |w_i|`.
-    pub(super) amplification: f64,
 }
 
 impl Boxes {
@@ -136,6 +136,8 @@ impl Boxes {
                 }
             }
         }
+        let of_vertex = triangles.iter().flatten().map(|&vertex| amplification(&hybrid.skin_carriers, vertex));
+        self.amplification.push(of_vertex.fold(1.0, f64::max));
         self.low_m.push(low);
         self.high_m.push(high);
         self.first.push(self.nodes.len() as u32);
@@ -150,7 +152,7 @@ impl Boxes {
             (least, most) = (least.min(u), most.max(u));
         }
         let middle = (least + most) * 0.5;
-        let reach = ((most - least) * 0.5 + bounds.deviation_m) * bounds.amplification;
+        let reach = ((most - least) * 0.5 + bounds.deviation_m) * self.amplification[number];
         box_distance_m(from_m, self.low_m[number] + middle - reach, self.high_m[number] + middle + reach)
     }
 }

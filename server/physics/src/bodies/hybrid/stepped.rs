@@ -30,15 +30,16 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         let HybridScratch { patch, skin, .. } = &mut **scratch;
         let MechanicalState { x, v, external_n, tools, contact: touched, load_factors, .. } = state;
         patch.displace(body, x);
+        let mut view = SkinView::new(body, patch).moving(v);
         let touch = Touch {
             tools,
             contact: touched,
             load_factors,
             external_n,
             scratch: contact,
-            fastest_m_per_s: if now.fastest_m_per_s > 0.0 { body.fastest_of_skin_m_per_s(v) } else { 0.0 },
+            fastest_m_per_s: if now.fastest_m_per_s > 0.0 { view.fastest_m_per_s() } else { 0.0 },
         };
-        touch_skin(tick, now, body.skin_rest_m(), &mut SkinView::new(body, patch).moving(v), skin, touch);
+        touch_skin(tick, now, body.skin_rest_m(), &mut view, skin, touch);
         let MechanicalState { x, v, force_n, viscous, ledger, .. } = &mut *state;
         let every = tick.environment.steps.substeps_per_long_step;
         let (mut viscous_w, mut taken_j) = (0.0, 0.0);
