@@ -196,7 +196,6 @@ fn a_sphere_meets_the_force_of_a_solid_wherever_it_presses() {
                 error.abs() < bound,
                 "nu {poisson}, cells of {cell_m}, {depth_m} deep, {aside} cells aside: {error:+.3}"
             );
-            let _ = bound;
         }
     }
 }

@@ -37,7 +37,7 @@ enum Command {
     ///
     /// A sheet of springs pulled at one vertex, before and after one ring or two about it are refined: which constants make it feel the same.
     Subdivision(subdivision::Options),
-    /// How much too stiff linear tets are, by Poisson's ratio and size: a block pressed by patches and spheres
+    /// How much too stiff tets are, linear and smoothed, by Poisson's ratio and size: a block pressed by patches and spheres, some 20 minutes
     Locking,
     /// Force against depth of a block with particles that a sphere on a spring presses two radii deep, beside the reference's: some minutes a depth
     Deep(deep::Options),

@@ -6,7 +6,7 @@ use glam::DVec3;
 /// What the nodes of a skin follow, and so how well they give way to a small load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum SkinFollows {
-    /// Nodes of linear elements, or of springs, which give way less than a solid.
+    /// Nodes of linear elements or of springs, or points of particles' cells: they give way less than a solid.
     StiffElements,
     /// Nodes of elements that give way as a solid does.
     TrueElements,

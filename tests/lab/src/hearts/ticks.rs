@@ -23,8 +23,7 @@ const GAP_M: f64 = 20e-3;
 const SPEED_M_PER_S: f64 = 0.1;
 /// How far (m) it is dragged either way.
 const DRAG_M: f64 = 15e-3;
-/// Ticks of 1 ms at rest, of dragging, of which the first are not counted, after it has gone until the heart is taken to be left alone, and of
-/// swaying alone.
+/// Ticks of 1 ms at rest, of dragging, after the hand is back until the heart is taken to be left alone, and of swaying alone.
 const REST_TICKS: u32 = 300;
 const DRAG_TICKS: u32 = 1_000;
 const LEAVES_TICKS: u32 = 400;

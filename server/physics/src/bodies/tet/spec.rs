@@ -2,10 +2,9 @@
 use crate::elements::solid::Solid;
 
 /// What the elastic energy of a body of tetrahedra is taken of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TetElements {
     /// The strain of every tet. They are too stiff in bending, and lock as Poisson's ratio nears ½.
-    #[default]
     Linear,
     /// Mostly of the mean strain around every node (docs/adr/smoothed-tets.md).
     Smoothed,
