@@ -12,7 +12,7 @@ use thiserror::Error;
 const MAGIC: [u8; 4] = *b"PLPS";
 const HEADER: usize = 24;
 /// Version of the layout; snapshots of other versions are refused.
-pub const VERSION: u32 = 19;
+pub const VERSION: u32 = 20;
 
 /// Why bytes are not a state of a body.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -154,6 +154,7 @@ mod tests {
             law: crate::material::Law::StableNeoHookean,
             lame: crate::material::Lame::from_young_poisson(1e4, 0.3).unwrap(),
             viscosity: crate::material::Viscosity::default(),
+            crushing_pa: 0.0,
         };
         Model::build(ModelSpec {
             body: BodySpec::Tet(

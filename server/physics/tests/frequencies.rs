@@ -5,7 +5,8 @@ mod common;
 use common::{block, extrapolated, held, material, mean_displacement_m, nodes_where, spec};
 use glam::DVec3;
 use palpate_physics::{
-    Model, Scratch, State, Substeps, TickInput, bodies::tet::Mode, material::Law, statics::natural_modes, step,
+    Model, Scratch, State, Substeps, TickInput, elements::natural_modes::Mode, material::Law, statics::natural_modes,
+    step,
 };
 use std::f64::consts::TAU;
 

@@ -5,12 +5,15 @@ mod walls;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::DVec3;
 use palpate_physics::{
-    Integrator, LoadSpec, PointForce, SelfContactChoice, Substeps, TickInput,
+    Integrator, LoadSpec, PointForce, Precision, SelfContactChoice, Substeps, TickInput,
     bodies::hybrid::{ParticleSpec, Skin, Waking},
     contact::{Coupling, ToolShape, ToolTarget},
     material::{Lame, Law, Viscosity},
 };
-use rig::{Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, solid_mut, sphere, with_particles};
+use rig::{
+    Rig, at, body, bricks, even, hold, material, mesh_of, nodes_where, particles_mut, pressed_block, solid_mut, sphere,
+    with_particles,
+};
 use walls::{gripped_clamp, hybrid_clamp, squeeze_hybrid};
 
 #[global_allocator]
@@ -164,6 +167,31 @@ fn nor_does_sleep() {
         }
     });
     assert!(slept > 200, "{slept}");
+}
+
+/// A hybrid falls asleep, sleeps while its tool comes, and wakes.
+#[test]
+fn nor_does_the_sleep_of_a_hybrid() {
+    let mut spec = pressed_block(Precision::Single, None);
+    spec.settings.sleep_tolerance_m = 1e-6;
+    particles_mut(&mut spec).waking = Waking::ByTools { reach_m: 8e-3 };
+    let mut rig = Rig::new(spec);
+    let (mut slept, mut woke) = (0, 0);
+    assert_no_alloc(|| {
+        for tick in 0..4000 {
+            let above_m = 0.03 - 0.026 * ((f64::from(tick) - 3000.0) / 500.0).clamp(0.0, 1.0);
+            let input = TickInput {
+                tools: &[at(DVec3::Z * above_m)],
+                load_factors: &[],
+                prescribed_displacements_m: &[DVec3::ZERO],
+                point_forces: &[],
+            };
+            palpate_physics::step(&rig.model, &mut rig.state, &mut rig.scratch, &input);
+            slept += u32::from(rig.state.sleep.asleep);
+            woke += u32::from(!rig.state.body.active_particles().is_empty());
+        }
+    });
+    assert!(slept > 200 && woke > 200, "{slept} {woke}");
 }
 
 fn ticks_allocate_nothing(integrator: Integrator, ticks: u32) {

@@ -3,10 +3,13 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{
-    Energies, Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, PrescribedSpec, contact::Coupling,
-    material::Law, snapshot, tick::EnvironmentError,
+    Energies, Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, PrescribedSpec, bodies::hybrid::Waking,
+    contact::Coupling, material::Law, snapshot, tick::EnvironmentError,
 };
-use rig::{Drive, Rig, at, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};
+use rig::{
+    Drive, Rig, at, body, bricks, even, held_below, hold, hybrid_block, material, nodes_where, particles,
+    particles_mut, solid_mut, sphere,
+};
 
 const TOLERANCE_M: f64 = 1e-7;
 const RADIUS_M: f64 = 0.006;
@@ -127,6 +130,113 @@ fn a_tool_on_its_coupling_moves_while_the_body_sleeps() {
     assert!(slept.iter().any(|tick| (1520..1600).contains(tick)), "it sleeps while the tool comes");
     assert!(slept.iter().all(|tick| *tick < 1760), "and not when it is there");
     assert!(worst_m <= 2.0 * TOLERANCE_M, "{worst_m}");
+}
+
+/// A weighing block with particles that a tool wakes, and loads like [`block`]'s on its skin.
+fn hybrid(tolerance_m: f64) -> ModelSpec {
+    let mut spec = held_below(hybrid_block((0.02, 1, 8), 0.45, 400, Waking::ByTools { reach_m: 8e-3 }));
+    let positions_m = particles(&spec).skin.positions_m();
+    let top = (0..positions_m.len() as u32).filter(|&vertex| positions_m[vertex as usize].z > -1e-9);
+    let pushed = top.map(|vertex| (vertex, DVec3::X * 1e-4)).collect();
+    spec.gravity_m_per_s2 = DVec3::NEG_Z * 9.81;
+    spec.loads = vec![LoadSpec::NodalForces(pushed)];
+    spec.tools = vec![sphere(RADIUS_M, AWAY, Coupling::Rigid)];
+    spec.settings.mass_damping_per_s = 60.0;
+    spec.settings.sleep_tolerance_m = tolerance_m;
+    spec
+}
+
+/// Touched after 1.5 s, and left alone from 2 s on.
+fn touched(tick: u32) -> (DVec3, f64, Option<PointForce>) {
+    let (to, back) = ((f64::from(tick) - 1500.0) / 300.0, (f64::from(tick) - 2000.0) / 300.0);
+    let way = to.clamp(0.0, 1.0) - back.clamp(0.0, 1.0);
+    (AWAY.lerp(DVec3::new(0.001, 0.002, RADIUS_M - 0.002), way), 0.0, None)
+}
+
+fn sleeps_in(slept: &[u32], range: std::ops::Range<u32>) -> usize {
+    slept.iter().filter(|tick| range.contains(tick)).count()
+}
+
+/// All of it sleeps once its particles do and its coarse level is at rest. A tool wakes it before it is there, for its particles are to be awake
+/// then; whether it slept changes nothing that is felt.
+#[test]
+fn a_hybrid_sleeps_as_a_whole_and_wakes_with_its_particles() {
+    for fine_depth_m in [None, Some(6e-3)] {
+        let spec = |tolerance_m| {
+            let mut spec = hybrid(tolerance_m);
+            particles_mut(&mut spec).fine_depth_m = fine_depth_m;
+            spec.settings.precision = palpate_physics::Precision::Double;
+            spec
+        };
+        let (mut sleepy, mut awake) = (Rig::new(spec(TOLERANCE_M)), Rig::new(spec(0.0)));
+        let (mut slept, mut worst_n, mut most_n, mut most_awake) = (Vec::new(), 0.0_f64, 0.0_f64, 0);
+        for tick in 0..4000 {
+            for rig in [&mut sleepy, &mut awake] {
+                let input = drive(rig, touched(tick));
+                rig.tick(&input);
+            }
+            if sleepy.state.sleep.asleep {
+                assert!(sleepy.state.body.active_particles().is_empty());
+                slept.push(tick);
+            }
+            let force_n = |rig: &Rig| rig.state.mechanical.tools[0].contact_force_n;
+            worst_n = worst_n.max(force_n(&sleepy).distance(force_n(&awake)));
+            most_n = most_n.max(force_n(&awake).length());
+            most_awake = most_awake.max(awake.state.body.active_particles().len());
+            assert_eq!(sleepy.state.body.active_particles().len(), awake.state.body.active_particles().len());
+        }
+        println!(
+            "{fine_depth_m:?}: slept {} of 4000 ticks; {worst_n:.1e} of {most_n:.3} N; {most_awake} awake",
+            slept.len()
+        );
+        assert!(sleeps_in(&slept, 0..1500) > 500 && sleeps_in(&slept, 2300..4000) > 300);
+        // A moment before it is touched until the last of its particles sleeps.
+        assert_eq!(sleeps_in(&slept, 1730..2200), 0);
+        assert!(most_n > 0.05 && most_awake > 50 && worst_n < 1e-3 * most_n, "{worst_n} of {most_n}");
+    }
+}
+
+/// A hybrid is saved and restored, asleep and in every other state, into buffers that know nothing of it: the same bits as without.
+#[test]
+fn a_restored_hybrid_sleeper_goes_on_bit_for_bit() {
+    let (mut whole, mut restored) = (Rig::new(hybrid(1e-6)), Rig::new(hybrid(1e-6)));
+    let mut slept = 0;
+    for tick in 0..3000 {
+        if tick % 97 == 0 {
+            let bytes = snapshot::save(&restored.model, &restored.state);
+            restored.scratch = palpate_physics::Scratch::new(&restored.model);
+            restored.state = snapshot::restore(&restored.model, &bytes).unwrap();
+        }
+        for rig in [&mut whole, &mut restored] {
+            let input = drive(rig, touched(tick));
+            rig.tick(&input);
+        }
+        slept += u32::from(whole.state.sleep.asleep);
+        assert!(whole.state == restored.state, "tick {tick}, {slept} of them asleep");
+    }
+    assert!(slept > 1000, "{slept}");
+}
+
+/// Loads, injected forces and moved supports wake a hybrid in their tick.
+#[test]
+fn a_hybrid_wakes_for_whatever_acts_on_it() {
+    for what in 0..3 {
+        let mut rig = Rig::new(hybrid(1e-6));
+        while !rig.state.sleep.asleep {
+            let input = drive(&rig, (AWAY, 0.0, None));
+            rig.tick(&input);
+            assert!(rig.state.mechanical.tick < 3000);
+        }
+        assert_eq!(Energies::of(&rig.model, &rig.state).kinetic_j, 0.0);
+        let force = PointForce { node: 3, force_n: DVec3::X * 0.01 };
+        let mut input = drive(&rig, (AWAY, if what == 0 { 1.0 } else { 0.0 }, (what == 1).then_some(force)));
+        if what == 2 {
+            input.prescribed[0] = DVec3::X * 1e-4;
+        }
+        let before = rig.state.mechanical.x.clone();
+        let report = rig.tick(&input);
+        assert!(!rig.state.sleep.asleep && report.substeps > 0 && rig.state.mechanical.x != before, "{what}");
+    }
 }
 
 /// What creeps is slow and its force small, by viscous stress or by mass damping; it is not at rest before it is there.

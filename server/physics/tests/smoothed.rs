@@ -2,16 +2,19 @@
 //! are better at: bending, and volume that hardly changes.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 mod common;
+mod rig;
 use common::{
     Random, block, equilibrium, held, jittered, material, mean_displacement_m, nodes_where, spec, triangles_where,
 };
 use glam::{DMat3, DQuat, DVec3};
 use palpate_physics::{
-    BodySpec, LoadSpec, Model, ModelSpec, Precision, TetMesh,
+    BodySpec, LoadSpec, Model, ModelSpec, Precision, Settings, TetMesh,
     bodies::tet::{TetElements, TetSpec},
     contact::{Coupling, ToolShape, ToolSpec, ToolTarget},
+    elements::linear_tet::RestTet,
     material::Law,
     statics::{Goal, StaticSettings, solve_static},
+    world::min_volume_ratio,
 };
 use std::ops::ControlFlow;
 
@@ -80,15 +83,20 @@ fn rigid_motion_makes_no_force() {
     }
 }
 
-/// `f = −∂U/∂x` along random directions, and no net force or torque, whatever the sign of λ.
+/// `f = −∂U/∂x` and `−K a = ∂f/∂a` along random directions, and no net force or torque, whatever the sign of λ, and with tets
+/// that are crushed and inside out.
 #[test]
 fn forces_are_derivatives_of_the_energy_and_balance() {
     let mut random = Random(11);
     for law in Law::ALL {
-        for poisson in [-0.2, 0.3, 0.49] {
+        for (poisson, moved_m) in [(-0.2, 2e-3), (0.3, 2e-3), (0.49, 2e-3), (0.3, 15e-3), (0.49, 15e-3)] {
             let model = body(law, poisson, Precision::Double);
-            let points = model.body().as_tet().unwrap().points();
-            let x: Vec<DVec3> = model.rest_positions_m().iter().map(|p| *p + random.vector() * 2e-3).collect();
+            let tets = model.body().as_tet().unwrap();
+            let x: Vec<DVec3> = model.rest_positions_m().iter().map(|p| *p + random.vector() * moved_m).collect();
+            let ratios =
+                || tets.mesh().tets().iter().zip(tets.rest_tets()).map(|(tet, rest)| volume_ratio(*tet, rest, &x));
+            let (crushed, inside_out) = (ratios().filter(|j| *j < 0.5).count(), ratios().filter(|j| *j < 0.0).count());
+            assert_eq!(crushed > 20 && inside_out > 5, moved_m > 1e-2, "{crushed} {inside_out}");
             let forces = forces_n(&model, &x);
             let scale: f64 = forces.iter().map(|f| f.length()).sum();
             let torque: DVec3 = x.iter().zip(&forces).map(|(x, f)| x.cross(*f)).sum();
@@ -96,15 +104,60 @@ fn forces_are_derivatives_of_the_energy_and_balance() {
             assert!(torque.length() < 1e-13 * scale * SIZE_M, "{law:?} {poisson}: {torque}");
             for _ in 0..5 {
                 let direction: Vec<DVec3> = x.iter().map(|_| random.vector()).collect();
-                let energy = |by: f64| {
-                    let moved: Vec<DVec3> = x.iter().zip(&direction).map(|(x, d)| *x + *d * by).collect();
-                    points.energy_j(&moved)
-                };
+                let moved = |by: f64| -> Vec<DVec3> { x.iter().zip(&direction).map(|(x, d)| *x + *d * by).collect() };
                 let h = 1e-7;
+                let energy = |by: f64| tets.points().energy_j(&moved(by));
                 let measured = -(energy(h) - energy(-h)) / (2.0 * h);
                 let stated: f64 = forces.iter().zip(&direction).map(|(f, d)| f.dot(*d)).sum();
                 assert!((measured - stated).abs() < 1e-6 * scale, "{law:?} {poisson}: {measured} {stated}");
+
+                let (mut products, mut scratch) = (vec![DVec3::ZERO; x.len()], tets.kernel().scratch_for_products());
+                tets.kernel().linearise_at(model.rest_positions_m(), &x, &mut scratch);
+                tets.kernel().products_n([1.0, 0.0], &direction, &mut products, &mut scratch);
+                let (after, before) = (forces_n(&model, &moved(h)), forces_n(&model, &moved(-h)));
+                let differ = |node: usize| (after[node] - before[node]) / (2.0 * h) - products[node];
+                let worst = (0..x.len()).map(|node| differ(node).length()).fold(0.0, f64::max);
+                let largest = products.iter().map(|p| p.length()).fold(0.0, f64::max);
+                assert!(worst < 1e-5 * largest, "{law:?} {poisson} {moved_m}: {worst:e} of {largest:e}");
             }
+        }
+    }
+}
+
+fn volume_ratio(nodes: [u32; 4], rest: &RestTet, x: &[DVec3]) -> f64 {
+    let [a, b, c, d] = nodes.map(|node| x[node as usize]);
+    DMat3::from_cols(b - a, c - a, d - a).determinant() / (6.0 * rest.volume_m3)
+}
+
+/// A tool that jumps deep into a block crushes tets whose mean around nodes is sound; without a resistance of their own they were
+/// turned inside out (least ratios of volume −0.4 to −4).
+#[test]
+fn a_brutal_press_turns_no_tet_inside_out() {
+    for law in Law::ALL {
+        for poisson in [0.0, 0.3, 0.45, 0.49] {
+            let size_m = DVec3::new(0.08, 0.08, 0.04);
+            let mesh = block(size_m, [10, 10, 5]);
+            let floor = held(&mesh, "floor", [true; 3], |p| p.z == 0.0);
+            let mut body = smoothed(spec(mesh, material(law, YOUNG_PA, poisson), vec![floor], vec![]));
+            body.settings = Settings { mass_damping_per_s: 20.0, ..Settings::default() };
+            let above_m = DVec3::new(0.04, 0.04, 0.07);
+            body.tools = vec![ToolSpec {
+                name: "sphere".into(),
+                shape: ToolShape::Sphere,
+                radius_m: 0.01,
+                coupling: Coupling::Spring { stiffness_n_per_m: 400.0, damping_n_s_per_m: 2.0, mass_kg: 0.02 },
+                friction_coefficient: 0.0,
+                start_position_m: above_m,
+            }];
+            let mut rig = rig::Rig::new(body);
+            let mut least = f64::INFINITY;
+            for tick in 0..120 {
+                rig.tick_at(if tick < 5 { above_m } else { above_m - DVec3::Z * 0.09 });
+                assert_eq!(rig.state.quarantine, None, "{law:?} {poisson}, tick {tick}");
+                least = least.min(min_volume_ratio(&rig.model, &rig.state).unwrap().ratio);
+            }
+            println!("{law:?}, nu {poisson}: least volume ratio {least:.3}");
+            assert!(least > 0.0 && least < 0.5, "{law:?} {poisson}: {least}");
         }
     }
 }

@@ -52,7 +52,7 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
     let bottom = shape.region("z_min").unwrap().nodes();
     let lame = Lame::from_young_poisson(5e3, 0.4).unwrap();
     let viscosity = Viscosity::new(0.5, 0.5).unwrap();
-    let material = Material { law: Law::StableNeoHookean, lame, viscosity };
+    let material = Material { law: Law::StableNeoHookean, lame, viscosity, crushing_pa: 0.0 };
     let (nodes, tets) = (shape.mesh.positions_m().len(), shape.mesh.tets().len());
     let summary = BodySummary {
         origin: "box".into(),

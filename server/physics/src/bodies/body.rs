@@ -1,19 +1,15 @@
 //! What a body answers, whichever kind it is.
 use super::{
-    Body, BodyScratch, BodyState, MaterialPoint,
-    hybrid::HybridBody,
-    mass_spring::MassSpringBody,
-    of_both, of_kind,
-    seed::SeedBody,
-    tet::{ModesError, RestBound, TetBody},
+    Body, BodyScratch, BodyState, MaterialPoint, hybrid::HybridBody, mass_spring::MassSpringBody, of_both, of_kind,
+    seed::SeedBody, tet::TetBody,
 };
 use crate::{
-    elements::solid::Solid,
+    elements::{natural_modes::ModesError, solid::Solid},
     hash::{Chain, Fnv},
     material::Law,
     mesh::TetMesh,
     settings::PrescribedSpec,
-    tick::{AwakeFor, BodyKind, Energies, Environment, MechanicalState, PointForce},
+    tick::{AwakeFor, BodyKind, Energies, Environment, MechanicalState, PointForce, RestBound},
 };
 use glam::{DMat3, DVec3};
 
@@ -119,18 +115,19 @@ impl Body {
         of_kind!(Body, self, body => BodyKind::can_be_judged(&**body))
     }
 
-    /// The constants of the bound on how far it is from rest; `None` of bodies that have none.
+    /// The constants of the bound on how far it is from rest; `None` of bodies that never sleep as a whole.
     ///
     /// # Errors
-    /// A body that is not held, or whose modes are not found.
+    /// A body that is not held, or whose lowest mode is not found.
     pub(crate) fn rest_bound(&self, environment: &Environment) -> Result<Option<RestBound>, ModesError> {
-        let Self::Tet(body) = self else { return Ok(None) };
-        RestBound::new(body, &environment.surface).map(Some)
+        of_kind!(Body, self, body => body.rest_bound(&environment.surface))
     }
 
-    /// A bound (m) on how far any node is from rest, now and later, while nothing that acts on the body changes.
-    pub(crate) fn distance_from_rest_m(&self, bound: &RestBound, state: &MechanicalState) -> f64 {
-        if let Self::Tet(body) = self { bound.distance_m(body, state) } else { f64::INFINITY }
+    /// A bound (m) on how far any of it is from rest, now and later, while nothing that acts on the body changes.
+    pub(crate) fn distance_from_rest_m(&self, bound: &RestBound, own: &BodyState, state: &MechanicalState) -> f64 {
+        of_both!(Body, self, BodyState, own, (body, own) => {
+            body.distance_from_rest_m(bound, own, state)
+        }, else f64::INFINITY)
     }
 
     /// Writes where each vertex of the surface is (m).

@@ -51,6 +51,7 @@ pub(crate) use self_contact::SelfContact;
 pub(crate) use skin_at_rest::{SkinAtRest, SkinFollows};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;
+pub(crate) use stepping::Drifted;
 pub(crate) use tangent::{ContactTangents, StepAhead};
 pub use tool::{Capsule, Coupling, LocalContactModel, ToolShape, ToolSpec, ToolState, ToolTarget, Turning};
 pub use triangle::closest_weights;

@@ -6,9 +6,21 @@ use super::{
     local_model::{self, MeanContact},
     narrow::{self, Meeting, Pressed},
     proxy,
+    state::ToolContact,
     tool_pairs::Push,
 };
 use glam::DVec3;
+
+/// Where tools are after they moved past a body that stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Drifted {
+    /// One is pushed by another.
+    Pushed,
+    /// None can be near, by the lists that there are.
+    Away,
+    /// It has to be looked.
+    PerhapsNear,
+}
 
 impl ContactModel {
     /// Begins a tick, before its first substep.
@@ -68,17 +80,31 @@ impl ContactModel {
     ) -> bool {
         let mut renewed = false;
         for (index, tool) in tools.iter().enumerate() {
-            let (part, fitted) = contact.split(index);
-            let candidates = &mut part.candidates;
-            if scratch.exhaustive {
-                renewed |= candidates.triangles().len() != self.triangles.len();
-                self.triangles.list_all(candidates);
-            } else if candidates.slack_m <= 0.0 {
-                let reach = self.reach(index);
-                let axis = self.tools[index].axis(tool);
-                self.triangles.query_skin(skin, x, fitted, &axis, reach, candidates);
-                renewed = true;
-            }
+            let axis = self.tools[index].axis(tool);
+            renewed |= self.list_candidates_on_skin(index, &axis, skin, x, contact, scratch.exhaustive);
+        }
+        renewed
+    }
+
+    fn list_candidates_on_skin(
+        &self,
+        tool: usize,
+        axis: &Axis,
+        skin: &mut impl Skin,
+        x: &mut [DVec3],
+        contact: &mut ContactState,
+        exhaustive: bool,
+    ) -> bool {
+        let (part, fitted) = contact.split(tool);
+        let candidates = &mut part.candidates;
+        if exhaustive {
+            let renewed = candidates.triangles().len() != self.triangles.len();
+            self.triangles.list_all(candidates);
+            return renewed;
+        }
+        let renewed = candidates.slack_m <= 0.0;
+        if renewed {
+            self.triangles.query_skin(skin, x, fitted, axis, self.reach(tool), candidates);
         }
         renewed
     }
@@ -134,38 +160,95 @@ impl ContactModel {
         contact: &mut ContactState,
         scratch: &mut ContactScratch,
     ) -> bool {
-        let exhaustive = scratch.exhaustive;
-        if (0..tools.len()).any(|index| self.push_of_others(index, tools).is_some()) {
-            return false;
+        let apart = match self.drift_apart(time, tools, contact, scratch) {
+            Drifted::Pushed => false,
+            Drifted::Away => true,
+            Drifted::PerhapsNear => !tools.iter().enumerate().any(|(index, tool)| {
+                let axis = self.tools[index].axis(tool);
+                self.list_candidates(index, &axis, x, contact, scratch.exhaustive);
+                self.is_near(index, &axis, &|node| x[node as usize], contact)
+            }),
+        };
+        if apart {
+            self.finish_apart(time, tools, contact, scratch);
         }
-        for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
+        apart
+    }
+
+    /// Does the first part of [`Self::substep_apart`]: the tools move.
+    pub(crate) fn drift_apart(
+        &self,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        scratch: &ContactScratch,
+    ) -> Drifted {
+        if (0..tools.len()).any(|index| self.push_of_others(index, tools).is_some()) {
+            return Drifted::Pushed;
+        }
+        for (index, tool) in tools.iter_mut().enumerate() {
             self.drift(index, tool, time, contact);
+        }
+        let is_away = |part: &ToolContact| part.candidates.slack_m > 0.0 && part.candidates.triangles().is_empty();
+        if !scratch.exhaustive && contact.tools.iter().all(is_away) { Drifted::Away } else { Drifted::PerhapsNear }
+    }
+
+    /// Does the second part, on a skin: returns whether any tool is near it. `x` has room for the positions (m) of all vertices.
+    pub(crate) fn any_is_near(
+        &self,
+        skin: &mut impl Skin,
+        x: &mut [DVec3],
+        tools: &[ToolState],
+        contact: &mut ContactState,
+        scratch: &ContactScratch,
+    ) -> bool {
+        tools.iter().enumerate().any(|(index, tool)| {
             let axis = self.tools[index].axis(tool);
-            self.list_candidates(index, &axis, x, contact, exhaustive);
-            if self.is_near(index, &axis, x, contact) {
-                return false;
-            }
+            self.list_candidates_on_skin(index, &axis, skin, x, contact, scratch.exhaustive);
+            self.is_near(index, &axis, &|vertex| skin.position_m(vertex), contact)
+        })
+    }
+
+    /// Does the last part: nothing but their couplings pulls the tools.
+    pub(crate) fn finish_apart(
+        &self,
+        time: &SubstepTime,
+        tools: &mut [ToolState],
+        contact: &mut ContactState,
+        scratch: &mut ContactScratch,
+    ) {
+        for (index, (tool, scratch)) in tools.iter_mut().zip(&mut scratch.tools).enumerate() {
             let nothing = Pressed { to_surface_m: DVec3::INFINITY, ..Pressed::default() };
             contact.tools[index].is_clear = true;
             let coupling = proxy::finish(&self.tools[index], tool, &nothing, DVec3::ZERO, time);
             scratch.coupling_sum_n += coupling.force_n;
             scratch.coupling_sum_nm += coupling.torque_nm;
         }
-        true
     }
 
     /// Returns whether no tool is within a quarter of its radius of the surface. The lists must be of the present
     /// positions.
     pub fn is_apart(&self, x: &[DVec3], tools: &[ToolState], contact: &ContactState) -> bool {
-        tools.iter().enumerate().all(|(index, tool)| !self.is_near(index, &self.tools[index].axis(tool), x, contact))
+        self.is_apart_at(&|node| x[node as usize], tools, contact)
+    }
+
+    /// Does the same with a surface whose vertices' positions (m) are asked for.
+    pub(crate) fn is_apart_at(
+        &self,
+        position_m: &dyn Fn(u32) -> DVec3,
+        tools: &[ToolState],
+        contact: &ContactState,
+    ) -> bool {
+        let is_near = |(index, tool)| self.is_near(index, &self.tools[index].axis(tool), position_m, contact);
+        !tools.iter().enumerate().any(is_near)
     }
 
     /// Returns whether a tool is near the surface. It measures distances, since which triangles beyond the zone are
     /// listed depends on when the list was made.
-    fn is_near(&self, tool: usize, axis: &Axis, x: &[DVec3], contact: &ContactState) -> bool {
+    fn is_near(&self, tool: usize, axis: &Axis, position_m: &dyn Fn(u32) -> DVec3, contact: &ContactState) -> bool {
         let zone_m = (1.0 + proxy::NEAR) * self.tools[tool].spec.radius_m;
         let listed = contact.tools[tool].candidates.triangles();
-        listed.iter().any(|&triangle| axis.distance_m(self.triangles.corners(triangle as usize, x)) < zone_m)
+        listed.iter().any(|&triangle| axis.distance_m(self.triangles.nodes[triangle as usize].map(position_m)) < zone_m)
     }
 
     fn drift(&self, index: usize, tool: &mut ToolState, time: &SubstepTime, contact: &mut ContactState) {

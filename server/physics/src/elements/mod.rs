@@ -4,6 +4,7 @@ pub mod integration_points;
 pub mod linear_tet;
 pub mod loads;
 pub mod mass;
+pub mod natural_modes;
 pub mod rest_stiffness;
 pub mod rigid_motion;
 pub mod smoothing;

@@ -7,7 +7,8 @@
 //! λ⁺ = max(λ, 0), λ⁻ = min(λ, 0), γ = 0.3
 //! ```
 //! (every law's Ψ is linear in λ and µ). Around nodes alone some motions would cost nothing: the tets' own part γ holds them.
-//! Volume is kept around nodes alone, or the tets would lock. Viscosity is divided as µ is. Tets of different regions are
+//! Volume is kept around nodes alone, or the tets would lock; but a tet that is pressed to half of its volume resists
+//! ([`crate::material::crushing_limit`]), or tools that press deep would turn single tets inside out. Viscosity is divided as µ is. Tets of different regions are
 //! not averaged: a node between two regions has a point of each. (Nodal averages: Dohrmann et al. 2000, Bonet & Burton 1998;
 //! stabilised: Puso & Solberg 2006.)
 use super::{integration_points::IntegrationPoints, linear_tet::RestTet};
@@ -19,6 +20,9 @@ use glam::DVec3;
 
 /// γ, the part of the stiffness against shear that tets have of their own.
 pub const OF_TETS: f64 = 0.3;
+
+/// κ of what tets resist of being crushed is `λ⁺` and so many times µ.
+const CRUSHING_SHEARS: f64 = 16.0;
 
 impl IntegrationPoints {
     /// Returns those of smoothed tetrahedra: a layer of tets, then one of nodes. `tet_material[t]` indexes `materials`.
@@ -53,6 +57,7 @@ fn materials_of_tets(materials: &[Material]) -> Vec<Material> {
         Material {
             lame: Lame { lambda_pa: OF_TETS * lame.lambda_pa.min(0.0), mu_pa: OF_TETS * lame.mu_pa },
             viscosity: times(OF_TETS, viscosity),
+            crushing_pa: lame.lambda_pa.max(0.0) + CRUSHING_SHEARS * lame.mu_pa,
             ..*material
         }
     };

@@ -83,7 +83,7 @@ impl Solid {
             return Err(SolidError::RegionOutOfRange { index, count });
         }
         for Region { name, material, density_kg_per_m3 } in &self.regions {
-            let Material { lame, viscosity, law: _ } = *material;
+            let Material { lame, viscosity, law: _, crushing_pa: _ } = *material;
             let constants =
                 Lame::new(lame.lambda_pa, lame.mu_pa).and(Viscosity::new(viscosity.phi_pa_s, viscosity.psi_pa_s));
             constants.map_err(|source| SolidError::Material { region: name.clone(), source })?;

@@ -7,6 +7,7 @@ use crate::lanes::{
 use crate::material::{
     ConstitutiveLaw,
     constants::Constants,
+    crushing_limit,
     lane_matrix::{M3, columns, plus, rows},
     law::any_outside,
     viscous::lane_viscous,
@@ -21,6 +22,7 @@ pub(super) fn compute<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, cons
     forces: &mut Lanes<T, N>,
 ) -> f64 {
     let c: Constants<V> = constants.converted();
+    let is_limited = constants.crushing > T::of(0.0);
     let mut inside = [T::of(0.0); N];
     let mut power = [T::of(0.0); N];
     for first in (0..N).step_by(V::WIDTH) {
@@ -28,6 +30,9 @@ pub(super) fn compute<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, cons
         let minus_volume = V::load(&input.rest.minus_volume[first..]);
         let h = gradient(&b, &load(input.edges, first));
         let mut stress = L::lane_piola(&c, &h);
+        if is_limited {
+            crushing_limit::add_lane_piola(c.crushing, &h, &mut stress.p);
+        }
         if VISCOUS {
             let viscous = lane_viscous(&c, &h, &gradient(&b, &load(input.edge_rates, first)));
             stress.p = plus(&stress.p, &viscous.p);
@@ -63,7 +68,9 @@ fn redo_outside<T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool, const N: usi
         }
         let b: [f64; 9] = input.rest.gradients.map(|component| component[lane].into());
         let h = gradient(&b, &input.edges.map(|component| component[lane].into()));
-        let mut p: M3<f64> = rows(&L::piola(constants.lame(), &(columns(&h) + DMat3::IDENTITY)));
+        let f = columns(&h) + DMat3::IDENTITY;
+        let limited = crushing_limit::piola(constants.crushing.into(), &f);
+        let mut p: M3<f64> = rows(&(L::piola(constants.lame(), &f) + limited));
         if VISCOUS {
             let h_dot = gradient(&b, &input.edge_rates.map(|component| component[lane].into()));
             p = plus(&p, &lane_viscous(&constants.converted(), &h, &h_dot).p);

@@ -7,6 +7,7 @@ use crate::lanes::{
 use crate::material::{
     ConstitutiveLaw,
     constants::Constants,
+    crushing_limit,
     lane_matrix::{M3, columns, plus, rows, scaled},
     law::any_outside,
     viscous::lane_viscous,
@@ -22,6 +23,7 @@ pub(super) fn compute<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, cons
     forces: &mut Lanes<T, N>,
 ) {
     let c: Constants<V> = constants.converted();
+    let is_limited = constants.crushing > T::of(0.0);
     let (alpha, beta) = (V::of(elastic), V::of(viscosity));
     let mut inside = [T::of(0.0); N];
     for first in (0..N).step_by(V::WIDTH) {
@@ -29,7 +31,10 @@ pub(super) fn compute<V: Vector<Scalar = T>, T: Scalar, L: ConstitutiveLaw, cons
         let minus_volume = V::load(&input.rest.minus_volume[first..]);
         let h = gradient(&b, &load(input.edges, first));
         let df = gradient(&b, &load(input.edge_rates, first));
-        let dp = L::lane_piola_differential(&c, &h, &df);
+        let mut dp = L::lane_piola_differential(&c, &h, &df);
+        if is_limited {
+            crushing_limit::add_lane_piola_differential(c.crushing, &h, &df, &mut dp.p);
+        }
         let mut p = scaled(&dp.p, alpha);
         if VISCOUS {
             p = plus(&p, &scaled(&lane_viscous(&c, &h, &df).p, beta));
@@ -65,7 +70,9 @@ fn redo_outside<T: Scalar, L: ConstitutiveLaw, const VISCOUS: bool, const N: usi
         let b: [f64; 9] = input.rest.gradients.map(|component| component[lane].into());
         let h = gradient(&b, &input.edges.map(|component| component[lane].into()));
         let df = gradient(&b, &input.edge_rates.map(|component| component[lane].into()));
-        let dp = L::piola_differential(constants.lame(), &(columns(&h) + DMat3::IDENTITY), &columns(&df));
+        let (f, df_columns) = (columns(&h) + DMat3::IDENTITY, columns(&df));
+        let limited = crushing_limit::piola_differential(constants.crushing.into(), &f, &df_columns);
+        let dp = L::piola_differential(constants.lame(), &f, &df_columns) + limited;
         let mut p: M3<f64> = scaled(&rows(&dp), elastic);
         if VISCOUS {
             p = plus(&p, &scaled(&lane_viscous(&constants.converted(), &h, &df).p, viscosity));

@@ -24,6 +24,26 @@ pub(crate) struct LowerTriangle {
     pub(crate) value: Vec<f64>,
 }
 
+impl LowerTriangle {
+    /// Returns the sum of entries, each a column, a row that is not above it, and a value; every column has its diagonal.
+    pub(crate) fn summed(unknowns: usize, mut entries: Vec<([u32; 2], f64)>) -> Self {
+        entries.extend((0..unknowns as u32).map(|diagonal| ([diagonal; 2], 0.0)));
+        // Stable, so that sums have the same bits in every run.
+        entries.sort_by_key(|(place, _)| *place);
+        let (mut column_start, mut row, mut value) = (Vec::with_capacity(unknowns + 1), Vec::new(), Vec::new());
+        for of_place in entries.chunk_by(|one, next| one.0 == next.0) {
+            let [column, at] = of_place[0].0;
+            if at == column {
+                column_start.push(row.len());
+            }
+            row.push(at as usize);
+            value.push(of_place.iter().map(|(_, value)| value).sum());
+        }
+        column_start.push(row.len());
+        Self { column_start, row, value }
+    }
+}
+
 /// Why a matrix cannot be factorised.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("the sparse factorisation of {unknowns} unknowns failed: {reason}")]

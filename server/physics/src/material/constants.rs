@@ -13,6 +13,8 @@ pub(crate) struct Constants<T> {
     pub(crate) phi: T,
     /// 2ψ (Pa s).
     pub(crate) two_psi: T,
+    /// κ (Pa) of [`super::crushing_limit`].
+    pub(crate) crushing: T,
 }
 
 impl<T: Scalar> Constants<T> {
@@ -22,6 +24,7 @@ impl<T: Scalar> Constants<T> {
             mu: T::of(material.lame.mu_pa),
             phi: T::of(material.viscosity.phi_pa_s),
             two_psi: T::of(2.0 * material.viscosity.psi_pa_s),
+            crushing: T::of(material.crushing_pa),
         }
     }
 
@@ -33,6 +36,7 @@ impl<T: Scalar> Constants<T> {
             mu: V::of(self.mu.into()),
             phi: V::of(self.phi.into()),
             two_psi: V::of(self.two_psi.into()),
+            crushing: V::of(self.crushing.into()),
         }
     }
 

@@ -7,6 +7,7 @@
 // A vector type is only fast where it is inlined into a function compiled for its instruction set.
 #![allow(clippy::inline_always)]
 pub(crate) mod constants;
+pub(crate) mod crushing_limit;
 pub mod fixed_corotated;
 pub(crate) mod lane_matrix;
 pub(crate) mod lane_strain;
@@ -77,28 +78,36 @@ pub struct Material {
     pub lame: Lame,
     /// Viscosities (Pa s).
     pub viscosity: Viscosity,
+    /// Modulus κ (Pa) of resistance to being crushed ([`crushing_limit`]), 0 where there is none: tets of a smoothed body
+    /// have it.
+    pub crushing_pa: f64,
 }
 
 impl Material {
     /// A material with a convention's factors applied to its constants.
     pub fn new(law: Law, lame: Lame, viscosity: Viscosity, convention: Convention) -> Self {
         let factor = convention.elastic_factor();
-        Self { law, lame: Lame { lambda_pa: factor * lame.lambda_pa, mu_pa: factor * lame.mu_pa }, viscosity }
+        Self {
+            law,
+            lame: Lame { lambda_pa: factor * lame.lambda_pa, mu_pa: factor * lame.mu_pa },
+            viscosity,
+            crushing_pa: 0.0,
+        }
     }
 
     /// Energy density `Ψ(F)` (J/m³), zero at `F = I`.
     pub fn energy_density(&self, f: &DMat3) -> f64 {
-        self.law.energy_density(self.lame, f)
+        self.law.energy_density(self.lame, f) + crushing_limit::energy_density(self.crushing_pa, f)
     }
 
     /// First Piola-Kirchhoff stress `P = ∂Ψ/∂F` (Pa).
     pub fn piola(&self, f: &DMat3) -> DMat3 {
-        self.law.piola(self.lame, f)
+        self.law.piola(self.lame, f) + crushing_limit::piola(self.crushing_pa, f)
     }
 
     /// Differential `δP = ∂P/∂F : δF` (Pa).
     pub fn piola_differential(&self, f: &DMat3, df: &DMat3) -> DMat3 {
-        self.law.piola_differential(self.lame, f, df)
+        self.law.piola_differential(self.lame, f, df) + crushing_limit::piola_differential(self.crushing_pa, f, df)
     }
 
     /// How much the P-wave modulus grows when no principal stretch exceeds `s ≥ 1`: the largest `n·(δP N)` for

@@ -149,7 +149,12 @@ mod tests {
     fn a_sheet_stretched_along_two_axes_resists_ever_more() {
         let lame = Lame { lambda_pa: 10.0, mu_pa: 1.0 };
         for law in [crate::material::Law::StableNeoHookean, crate::material::Law::FixedCorotated] {
-            let material = crate::material::Material { law, lame, viscosity: crate::material::Viscosity::default() };
+            let material = crate::material::Material {
+                law,
+                lame,
+                viscosity: crate::material::Viscosity::default(),
+                crushing_pa: 0.0,
+            };
             let pressure = |s: f64| {
                 // Laplace: pressure over a cap is in proportion to the tension s P, over the radius, per current area.
                 let f = DMat3::from_diagonal(DVec3::new(s, s, 1.0 / (s * s)));

@@ -1,6 +1,6 @@
 //! Which bits of equilibria a hash is of ([`Chain`]).
 use super::{StaticSolution, ToolAtRest};
-use crate::{bodies::tet::Mode, hash::Chain};
+use crate::{elements::natural_modes::Mode, hash::Chain};
 
 impl Chain {
     /// Adds an equilibrium, but not the way there.

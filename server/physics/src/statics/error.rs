@@ -1,7 +1,7 @@
 //! Why there is no equilibrium to show.
 use super::load_path;
 use crate::{
-    bodies::tet::ModesError,
+    elements::natural_modes::ModesError,
     elements::rigid_motion::{self, FreePart, RigidMotion},
     linalg::CholeskyError,
 };

@@ -20,11 +20,8 @@ mod solution;
 mod tet_model;
 
 use crate::{
-    bodies::{
-        Body,
-        tet::{self, Mode},
-    },
-    elements::rigid_motion::FreePart,
+    bodies::{Body, tet},
+    elements::{natural_modes::Mode, rigid_motion::FreePart},
     world::Model,
 };
 pub use equilibrium::Goal;

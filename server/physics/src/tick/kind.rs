@@ -4,11 +4,11 @@
 //! by a default here, which says what it means to have none.
 use super::{
     AwakeFor, Energies, Environment, Evaluation, Judged, MaterialPoint, MechanicalState, PointForce, PrescribedNodes,
-    Tick, free_inverse_mass,
+    RestBound, Tick, free_inverse_mass,
 };
 use crate::{
-    contact::ContactScratch,
-    elements::solid::Solid,
+    contact::{ContactScratch, SubstepTime},
+    elements::{natural_modes::ModesError, solid::Solid},
     hash::{Chain, Fnv},
     material::Law,
     mesh::{Surface, TetMesh},
@@ -112,6 +112,20 @@ pub(crate) trait BodyKind {
     /// Whether leapfrog's step of it can be judged ([`Stepped::judged`]).
     fn can_be_judged(&self) -> bool {
         false
+    }
+
+    /// The constants of the bound on how far it is from rest; `None` of kinds that never sleep as a whole.
+    ///
+    /// # Errors
+    /// A body that is not held, or whose lowest mode is not found.
+    fn rest_bound(&self, _: &Surface) -> Result<Option<RestBound>, ModesError> {
+        Ok(None)
+    }
+
+    /// A bound (m) on how far any of it is from rest, now and later, while nothing that acts on it changes; infinite while anything of it
+    /// changes by itself.
+    fn distance_from_rest_m(&self, _: &RestBound, _: &Self::State, _: &MechanicalState) -> f64 {
+        f64::INFINITY
     }
 
     /// Writes where each vertex of the surface is (m).
@@ -247,6 +261,27 @@ pub(crate) trait Stepped<'a> {
     /// Kinetic energy (J) that velocities of held axes have beside what lumped masses give them.
     fn held_kinetic_j(&self, _: &MechanicalState) -> f64 {
         0.0
+    }
+
+    /// Whether it may sleep on as a whole: nothing of it has woken.
+    fn sleeps_on(&self) -> bool {
+        true
+    }
+
+    /// Whether no tool is within a quarter of its radius of the surface. Contact's lists must be of the present positions.
+    fn is_apart(&mut self, environment: &Environment, state: &MechanicalState) -> bool {
+        environment.contact.is_apart(&state.x, &state.tools, &state.contact)
+    }
+
+    /// Moves the tools through a substep in which the body stands still. Stops and returns false as soon as one is near the surface.
+    fn tools_stay_apart(
+        &mut self,
+        environment: &Environment,
+        time: &SubstepTime,
+        state: &mut MechanicalState,
+        contact: &mut ContactScratch,
+    ) -> bool {
+        environment.contact.substep_apart(&state.x, time, &mut state.tools, &mut state.contact, contact)
     }
 
     /// Runs all substeps of a tick, of a body with a scheme of its own ([`BodyKind::has_own_scheme`]).

@@ -1,7 +1,7 @@
 //! Contact, loads and injected forces on a surface whose vertices are carried by nodes: the skin of a hybrid body, or a
 //! refined surface of springs.
-use super::{Evaluation, Tick};
-use crate::contact::{ContactScratch, ContactState, Skin, SurfaceNow, ToolState};
+use super::{Evaluation, MechanicalState, Tick};
+use crate::contact::{ContactModel, ContactScratch, ContactState, Skin, SurfaceNow, ToolState};
 use glam::DVec3;
 
 /// A surface whose vertices are carried by nodes, at one instant.
@@ -99,6 +99,19 @@ impl<C> ListedVertices<C> {
             }
         }
     }
+}
+
+/// Returns whether any tool is near a skin that stands still.
+pub(crate) fn any_tool_is_near<S: CarriedSkin>(
+    model: &ContactModel,
+    skin: &mut S,
+    listed: &mut ListedVertices<S::Carriers>,
+    state: &mut MechanicalState,
+    scratch: &ContactScratch,
+) -> bool {
+    // Contact may list other triangles, whose vertices are not those that were listed.
+    listed.layout = u64::MAX;
+    model.any_is_near(skin, &mut listed.x, &state.tools, &mut state.contact, scratch)
 }
 
 /// What touches a skin: the parts of a [`super::MechanicalState`] that the skin itself does not read.

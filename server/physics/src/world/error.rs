@@ -1,12 +1,7 @@
 //! Why a model cannot be built.
 use crate::{
-    bodies::{
-        BodyError,
-        hybrid::HybridError,
-        mass_spring::MassSpringError,
-        seed::SeedError,
-        tet::{ModesError, TetBodyError},
-    },
+    bodies::{BodyError, hybrid::HybridError, mass_spring::MassSpringError, seed::SeedError, tet::TetBodyError},
+    elements::natural_modes::ModesError,
     tick::EnvironmentError,
 };
 use thiserror::Error;

@@ -10,16 +10,16 @@
 //!
 //! Ledger: the kinetic energy that is dropped counts as dissipated.
 use super::{
-    Model, Scratch, State,
+    Model,
+    rollback::LastGood,
     step::{StepReport, write_reactions},
 };
 use crate::{
-    bodies::{
-        Body, SteppedBody,
-        tet::{ModesError, RestBound},
-    },
+    bodies::{Body, BodyState, SteppedBody},
     contact::{ContactScratch, SubstepTime, ToolState},
-    tick::{Environment, MechanicalState, TickInput, ViscousPower, take_tools},
+    elements::natural_modes::ModesError,
+    integrate::Pace,
+    tick::{Environment, MechanicalState, RestBound, TickInput, ViscousPower, take_tools},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -74,7 +74,7 @@ impl Sleep {
 }
 
 /// The bound of a body, and what it is to stay below.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct SleepBound {
     tolerance_m: f64,
     bound: RestBound,
@@ -90,76 +90,94 @@ impl SleepBound {
         if tolerance_m <= 0.0 {
             return Ok(None);
         }
-        // Bodies without a bound refuse to sleep as they are built.
+        // Kinds without a bound refuse to sleep as they are built.
         Ok(body.rest_bound(environment)?.map(|bound| Self { tolerance_m, bound }))
     }
 }
 
-/// Checks after a tick that was computed whether the body may sleep. `was_quiet` is [`Sleep::is_quiet`] before the
-/// tick.
-pub(super) fn consider(model: &Model, state: &mut State, input: &TickInput<'_>, was_quiet: bool) {
-    let Some(SleepBound { tolerance_m, bound }) = model.sleep_bound() else { return };
-    let State { mechanical, sleep, pace, .. } = state;
+/// Notes the inputs of a tick that was computed, and returns whether it is time to look whether the body may sleep. `was_quiet` is
+/// [`Sleep::is_quiet`] before the tick.
+pub(super) fn is_to_be_considered(
+    model: &Model,
+    tick: u64,
+    sleep: &mut Sleep,
+    input: &TickInput<'_>,
+    was_quiet: bool,
+) -> bool {
+    if model.sleep_bound().is_none() {
+        return false;
+    }
     if !was_quiet {
         sleep.still_checks = 0;
         let given = input.prescribed_displacements_m;
         if given.len() == sleep.held_m.len() && given.iter().all(|d| d.is_finite()) {
             sleep.held_m.copy_from_slice(given);
         }
-        return;
     }
-    if !mechanical.tick.is_multiple_of(CHECK_EVERY_TICKS) {
-        return;
-    }
-    let is_still = model.contact().is_apart(&mechanical.x, &mechanical.tools, &mechanical.contact)
-        && model.body().distance_from_rest_m(bound, mechanical) <= *tolerance_m;
+    was_quiet && tick.is_multiple_of(CHECK_EVERY_TICKS)
+}
+
+/// Looks whether the body may sleep; `is_apart` tells that no tool is near it.
+pub(super) fn consider(
+    model: &Model,
+    own: &BodyState,
+    state: &mut MechanicalState,
+    sleep: &mut Sleep,
+    pace: &mut Pace,
+    is_apart: bool,
+) {
+    let Some(SleepBound { tolerance_m, bound }) = model.sleep_bound() else { return };
+    let is_still = is_apart && model.body().distance_from_rest_m(bound, own, state) <= *tolerance_m;
     sleep.still_checks = if is_still { sleep.still_checks + 1 } else { 0 };
     if sleep.still_checks >= STILL_CHECKS {
         let kinetic_j: f64 =
-            mechanical.v.iter().zip(model.body().mass_kg()).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
-        mechanical.ledger.dissipated_j += kinetic_j;
-        mechanical.v.fill(DVec3::ZERO);
-        mechanical.viscous = ViscousPower::default();
+            state.v.iter().zip(model.body().mass_kg()).map(|(v, m)| 0.5 * m * v.length_squared()).sum();
+        state.ledger.dissipated_j += kinetic_j;
+        state.v.fill(DVec3::ZERO);
+        state.viscous = ViscousPower::default();
         pace.before_is_usable = false;
         sleep.asleep = true;
     }
 }
 
+/// What a sleeping body's tick changes.
+pub(super) struct Dozing<'a, 'b> {
+    pub(super) body: &'a mut SteppedBody<'b>,
+    pub(super) state: &'a mut MechanicalState,
+    pub(super) sleep: &'a mut Sleep,
+    pub(super) substeps: u32,
+    pub(super) last_good: &'a mut LastGood,
+    pub(super) contact: &'a mut ContactScratch,
+    pub(super) reaction_n: &'a mut [DVec3],
+}
+
 /// Takes a tick of a sleeping body, in which only its tools move. Returns `None` where the body woke, and the tick is
 /// still to be run.
-pub(super) fn doze(
-    model: &Model,
-    state: &mut State,
-    scratch: &mut Scratch,
-    input: &TickInput<'_>,
-) -> Option<StepReport> {
-    let environment = model.environment();
-    let State { mechanical, body: own, pace, sleep, .. } = state;
-    if !mechanical.force_is_current || !sleep.is_quiet(&mechanical.load_factors, input) {
+pub(super) fn doze(environment: &Environment, dozing: Dozing<'_, '_>, input: &TickInput<'_>) -> Option<StepReport> {
+    let Dozing { body, state, sleep, substeps, last_good, contact, reaction_n } = dozing;
+    if !state.force_is_current || !sleep.is_quiet(&state.load_factors, input) || !body.sleeps_on() {
         sleep.wake();
         return None;
     }
-    let Scratch { last_good, contact, body: buffers, reaction_n, .. } = scratch;
-    last_good.keep_tools(mechanical);
-    let inputs_rejected = take_tools(environment, mechanical, contact, input);
-    if !stays_apart(environment, mechanical, contact, pace.substeps) {
-        last_good.put_tools_back(mechanical);
+    last_good.keep_tools(state);
+    let inputs_rejected = take_tools(environment, state, contact, input);
+    if !stay_apart(environment, body, state, contact, substeps) {
+        last_good.put_tools_back(state);
         // The broad phase's lists belong to tools at other positions.
-        mechanical.force_is_current = false;
+        state.force_is_current = false;
         sleep.wake();
         return None;
     }
-    environment.contact.end_tick(&mut mechanical.tools, &mut mechanical.contact, pace.substeps, contact);
-    if let Some(body) = SteppedBody::of(model.body(), own, buffers) {
-        write_reactions(environment, &body, mechanical, reaction_n);
-    }
-    mechanical.tick = mechanical.tick.saturating_add(1);
+    environment.contact.end_tick(&mut state.tools, &mut state.contact, substeps, contact);
+    write_reactions(environment, body, state, reaction_n);
+    state.tick = state.tick.saturating_add(1);
     Some(StepReport { substeps: 0, repeated: 0, inputs_rejected, quarantined: None })
 }
 
 /// Moves the tools through a tick. Returns whether none of them came near the surface.
-fn stays_apart(
+fn stay_apart(
     environment: &Environment,
+    body: &mut SteppedBody<'_>,
     state: &mut MechanicalState,
     scratch: &mut ContactScratch,
     substeps: u32,
@@ -168,8 +186,7 @@ fn stays_apart(
     let dt_s = tick_period_s / f64::from(substeps);
     let apart = (1..=substeps).all(|number| {
         let time = SubstepTime { fraction: f64::from(number) / f64::from(substeps), dt_s, tick_period_s };
-        let (tools, contact) = (&mut state.tools, &mut state.contact);
-        environment.contact.substep_apart(&state.x, &time, tools, contact, scratch)
+        body.tools_stay_apart(environment, &time, state, scratch)
     });
     apart && state.tools.iter().all(ToolState::is_finite)
 }

@@ -45,19 +45,22 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     if state.quarantine.is_some() {
         return StepReport::NOTHING;
     }
-    if state.sleep.asleep
-        && let Some(report) = sleep::doze(model, state, scratch, input)
-    {
-        return report;
-    }
     let environment = model.environment();
-    let State { mechanical, body: own, pace, .. } = state;
+    let State { mechanical, body: own, pace, sleep, quarantine, .. } = state;
     let Scratch { reaction_n, last_good, history, contact, body: buffers } = scratch;
     let Some(mut body) = SteppedBody::of(model.body(), own, buffers) else { return StepReport::NOTHING };
 
     body.prepare(environment, mechanical, input.point_forces);
+    if sleep.asleep {
+        let substeps = pace.substeps;
+        let (body, state) = (&mut body, &mut *mechanical);
+        let dozing = sleep::Dozing { body, state, sleep, substeps, last_good, contact, reaction_n };
+        if let Some(report) = sleep::doze(environment, dozing, input) {
+            return report;
+        }
+    }
     history.fit(environment, mechanical.x.len(), pace);
-    let was_quiet = model.sleep_bound().is_some() && state.sleep.is_quiet(&mechanical.load_factors, input);
+    let was_quiet = model.sleep_bound().is_some() && sleep.is_quiet(&mechanical.load_factors, input);
     last_good.keep(mechanical);
     body.keep_last_good();
     if let Some(judged) = body.judged().filter(|_| history.is_kept()) {
@@ -99,13 +102,19 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     match spoilt {
         Some(place) => {
             last_good.put_back(mechanical);
-            let quarantine = enter_quarantine(environment, place, &mut body, mechanical, pace, history.is_kept());
+            let entered = enter_quarantine(environment, place, &mut body, mechanical, pace, history.is_kept());
             reaction_n.fill(DVec3::ZERO);
-            state.sleep.wake();
-            state.quarantine = Some(quarantine);
-            report.quarantined = Some(quarantine);
+            sleep.wake();
+            *quarantine = Some(entered);
+            report.quarantined = Some(entered);
         }
-        None => sleep::consider(model, state, input, was_quiet && report.inputs_rejected == 0),
+        None => {
+            let was_quiet = was_quiet && report.inputs_rejected == 0;
+            if sleep::is_to_be_considered(model, mechanical.tick, sleep, input, was_quiet) {
+                let is_apart = body.is_apart(environment, mechanical);
+                sleep::consider(model, own, mechanical, sleep, pace, is_apart);
+            }
+        }
     }
     report
 }

@@ -70,7 +70,7 @@ pub fn at(position_m: DVec3) -> ToolTarget {
 
 pub fn material(law: Law, young_modulus_pa: f64, poisson_ratio: f64) -> Material {
     let lame = Lame::from_young_poisson(young_modulus_pa, poisson_ratio).unwrap();
-    Material { law, lame, viscosity: Viscosity::default() }
+    Material { law, lame, viscosity: Viscosity::default(), crushing_pa: 0.0 }
 }
 
 /// One material, 1000 kg/m³, f64, nothing held or loaded.

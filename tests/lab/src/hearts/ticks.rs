@@ -23,6 +23,9 @@ const GAP_M: f64 = 20e-3;
 const SPEED_M_PER_S: f64 = 0.1;
 /// How far (m) it is dragged either way.
 const DRAG_M: f64 = 15e-3;
+/// Distance from rest (m) below which a heart sleeps, and ticks after which it is taken never to.
+const SLEEP_TOLERANCE_M: f64 = 1e-6;
+const MOST_UNTIL_ASLEEP: u32 = 20_000;
 /// Ticks of 1 ms at rest, of dragging, after the hand is back until the heart is taken to be left alone, and of swaying alone.
 const REST_TICKS: u32 = 300;
 const DRAG_TICKS: u32 = 1_000;
@@ -59,9 +62,9 @@ pub fn print(options: &Options) -> Result<()> {
         1e3 * SPEED_M_PER_S
     );
     println!(
-        "| heart | awake | substeps | at rest | dragged: median, p99, longest | substeps taken | mean force | swaying |"
+        "| heart | awake | substeps | at rest | dragged: median, p99, longest | substeps taken | mean force | swaying | asleep: after, median, p99 |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     let text = palpate_scene::builtin("hybrid-ventricle").ok_or_else(|| miette!("the built-in scene is missing"))?;
     let shipped = palpate_scene::parse(text, "hybrid-ventricle", None, &Limits::local(), &mut |_, _| {})?;
     rows("hybrid-ventricle", &shipped.model, options)?;
@@ -84,6 +87,7 @@ fn rows(name: &str, spec: &ModelSpec, options: &Options) -> Result<()> {
         }
         spec.tools = Vec::new();
         let place = Place::of(&Model::build(spec.clone()).into_diagnostic()?);
+        spec.settings.sleep_tolerance_m = SLEEP_TOLERANCE_M;
         spec.tools = vec![ToolSpec {
             name: "finger".to_owned(),
             shape: ToolShape::Sphere,
@@ -179,7 +183,10 @@ impl<'a> Session<'a> {
         let step_m = SPEED_M_PER_S * self.model.settings().tick_period_s;
         let mut rest_s = Vec::new();
         for _ in 0..REST_TICKS {
-            rest_s.push(self.tick(-GAP_M, 0.0)?);
+            let took_s = self.tick(-GAP_M, 0.0)?;
+            if !self.state.sleep.asleep {
+                rest_s.push(took_s);
+            }
         }
         let way = ((GAP_M + DEPTH_M) / step_m) as u32;
         for tick in 0..way {
@@ -202,16 +209,38 @@ impl<'a> Session<'a> {
         for _ in 0..SWAY_TICKS {
             swaying_s.push(self.tick(-GAP_M, dragged_m)?);
         }
+        let left = self.state.mechanical.tick;
+        let asleep = self.falls_asleep(dragged_m)?;
         let [rest] = quantiles(&mut rest_s, [0.5]);
         let [median, p99, longest] = quantiles(&mut dragged_s, [0.5, 0.99, 1.0]);
         let [swaying] = quantiles(&mut swaying_s, [0.5]);
         Ok(format!(
-            "{:.1} | {:.0}, {:.0}, {:.0} | {substeps:.1} | {force_n:.3} N | {:.0}",
+            "{:.1} | {:.0}, {:.0}, {:.0} | {substeps:.1} | {force_n:.3} N | {:.0} | {}",
             1e6 * rest,
             1e6 * median,
             1e6 * p99,
             1e6 * longest,
-            1e6 * swaying
+            1e6 * swaying,
+            asleep.map_or("never".to_owned(), |(at, [median, p99])| {
+                format!("{:.1} s, {:.1}, {:.1}", 1e-3 * (at - left) as f64, 1e6 * median, 1e6 * p99)
+            })
         ))
+    }
+
+    /// Waits for the heart to fall asleep. Returns when it did (ticks), and the median and p99 of what its ticks take then (s); `None`
+    /// where it does not.
+    fn falls_asleep(&mut self, dragged_m: f64) -> Result<Option<(u64, [f64; 2])>> {
+        for _ in 0..MOST_UNTIL_ASLEEP {
+            if self.state.sleep.asleep {
+                let at = self.state.mechanical.tick;
+                let mut asleep_s = Vec::new();
+                for _ in 0..REST_TICKS {
+                    asleep_s.push(self.tick(-GAP_M, dragged_m)?);
+                }
+                return Ok(Some((at, quantiles(&mut asleep_s, [0.5, 0.99]))));
+            }
+            self.tick(-GAP_M, dragged_m)?;
+        }
+        Ok(None)
     }
 }

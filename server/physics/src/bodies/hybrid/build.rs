@@ -86,11 +86,5 @@ fn demand(around: &EnvironmentSpec) -> Result<(), HybridError> {
     if around.settings.integrator != Integrator::Leapfrog {
         return refused("this integrator", "take leapfrog");
     }
-    if around.settings.sleep_tolerance_m > 0.0 {
-        return refused(
-            "a body that sleeps as a whole",
-            "leave sleep_tolerance at 0: its particles sleep where nothing touches them",
-        );
-    }
     Ok(())
 }

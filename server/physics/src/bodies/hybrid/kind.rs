@@ -1,12 +1,15 @@
 //! What a hybrid body is as a kind of body.
-use super::{HybridBody, HybridSpec, HybridState, trilinear_point::TrilinearPoint};
+use super::{HybridBody, HybridSpec, HybridState, coarse_modes::CoarseModes, trilinear_point::TrilinearPoint};
 use crate::{
-    elements::solid::Solid,
+    elements::{natural_modes::ModesError, solid::Solid},
     hash::{Chain, Fnv},
     material::Law,
     mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
-    tick::{AwakeFor, BodyKind, Energies, Environment, KindSpec, MaterialPoint, MechanicalState, PointForce},
+    tick::{
+        AwakeFor, BodyKind, Energies, Environment, KindSpec, MaterialPoint, MechanicalState, NaturalBand, NodeMasses,
+        PointForce, RestBound,
+    },
 };
 use glam::{DMat3, DVec3};
 use std::fmt::Write;
@@ -104,6 +107,27 @@ impl BodyKind for HybridBody {
         at.particles.into_iter().zip(at.weights).map(|(particle, w)| moved(particle) * w).sum()
     }
 
+    /// Of the coarse level, which moves alone while all particles sleep, with its own lumped masses.
+    fn rest_bound(&self, _: &Surface) -> Result<Option<RestBound>, ModesError> {
+        let CoarseModes { lowest_rad_per_s, unfelt } = self.coarse_modes()?;
+        let highest_rad_per_s = self.coarse_frequency_rad_per_s();
+        let band = NaturalBand { lowest_rad_per_s, highest_rad_per_s, left_out: unfelt };
+        Ok(Some(RestBound::new(self.node_masses(), band, self.materials().materials)))
+    }
+
+    /// No vertex of the skin goes farther than the farthest node, times its amplification. What is left of the transition force fades: it is
+    /// as if its opposite came from one side.
+    fn distance_from_rest_m(&self, bound: &RestBound, own: &HybridState, state: &MechanicalState) -> f64 {
+        if !own.is_settled() {
+            return f64::INFINITY;
+        }
+        let force_n = |node: usize| state.force_n[node] + own.long_steps.beyond_of(node);
+        let left_n = |node: usize| own.transition_force_n.get(node).copied().unwrap_or_default();
+        let moving_m = bound.distance_m(self.node_masses(), force_n, |node| state.v[node]);
+        let fading_m = bound.distance_m(self.node_masses(), left_n, |_| DVec3::ZERO);
+        self.amplification().max(1.0) * (moving_m + fading_m)
+    }
+
     fn awake_for(
         &self,
         environment: &Environment,
@@ -121,5 +145,11 @@ impl BodyKind for HybridBody {
 
     fn chain_inverse_mass(&self, _: &[PrescribedSpec], chain: &mut Chain) {
         chain.vectors(self.inverse_mass_per_kg());
+    }
+}
+
+impl HybridBody {
+    fn node_masses(&self) -> NodeMasses<'_> {
+        NodeMasses { mass_kg: &self.masses().node_kg, inverse_mass_per_kg: self.inverse_mass_per_kg() }
     }
 }

@@ -6,6 +6,7 @@ mod build;
 mod carried_skin;
 pub mod cell;
 pub mod clusters;
+mod coarse_modes;
 pub mod composite;
 mod constrained_points;
 mod crushed_cells;

@@ -25,6 +25,8 @@ pub struct HybridState {
     pub(crate) prestrain: PrestrainDecay,
     /// The transition force (N), of as many entries as there are positions, or none.
     pub(super) transition_force_n: Vec<DVec3>,
+    /// The same as it was taken away at the last evaluation, before it decayed.
+    pub(super) transition_taken_n: Vec<DVec3>,
     /// Energy (J) that decaying prestrain and the transition force gave lately, beyond what they and switches took.
     pub(crate) given_j: f64,
     /// Largest elastic energy (J) of what any recent switch changed.
@@ -66,6 +68,11 @@ impl HybridState {
         }
     }
 
+    /// Returns whether all particles sleep, none is about to wake, and nothing has prestrain. A transition force may be fading.
+    pub(super) fn is_settled(&self) -> bool {
+        self.ids.is_empty() && self.next.is_empty() && self.wanted.is_empty() && self.prestrain.is_empty()
+    }
+
     pub(super) fn is_switching(&self) -> bool {
         self.next != self.ids
     }
@@ -100,6 +107,7 @@ impl HybridState {
         }
         self.ids.clone_from(&self.next);
         self.transition_force_n.clear();
+        self.transition_taken_n.clear();
         self.long_steps.forget();
         state.force_is_current = false;
     }
@@ -121,6 +129,7 @@ impl KindState for HybridState {
                 body.partition.residual_elements().len(),
             ),
             transition_force_n: Vec::with_capacity(positions),
+            transition_taken_n: Vec::with_capacity(positions),
             given_j: 0.0,
             switched_j: 0.0,
             long_steps: LongSteps::with_room(body.node_count(), positions),
@@ -137,6 +146,7 @@ impl KindState for HybridState {
         self.balls.fill(None);
         self.prestrain.clear();
         self.transition_force_n.clear();
+        self.transition_taken_n.clear();
         self.given_j = 0.0;
         self.switched_j = 0.0;
         self.long_steps.forget();
@@ -151,6 +161,7 @@ impl KindState for HybridState {
         self.balls.clone_from(&other.balls);
         self.prestrain.copy_from(&other.prestrain);
         self.transition_force_n.clone_from(&other.transition_force_n);
+        self.transition_taken_n.clone_from(&other.transition_taken_n);
         self.given_j = other.given_j;
         self.switched_j = other.switched_j;
         self.long_steps.copy_from(&other.long_steps);
@@ -166,8 +177,9 @@ impl KindState for HybridState {
         self.balls.len() == axis_sample_counts(body, &environment.tools).sum::<usize>()
             && self.balls.iter().flatten().all(finite)
             && self.prestrain.is_finite()
-            && [0, positions].contains(&self.transition_force_n.len())
-            && self.transition_force_n.iter().all(|force| force.is_finite())
+            && [&self.transition_force_n, &self.transition_taken_n]
+                .into_iter()
+                .all(|list| [0, positions].contains(&list.len()) && list.iter().all(|force| force.is_finite()))
             && self.given_j.is_finite()
             && self.switched_j.is_finite()
             && self.long_steps.fit(nodes, positions)

@@ -1,11 +1,11 @@
 //! Forces and kicks of a hybrid body.
 use super::{HybridBody, HybridScratch, HybridState, carried_skin::SkinView};
 use crate::{
-    contact::ContactScratch,
+    contact::{ContactScratch, Drifted, Skin, SubstepTime},
     lanes::{kicks::Kick, vector_operations},
     tick::{
         Environment, Evaluation, Judged, MechanicalState, PointForce, PrescribedNodes, Stepped, Tick, Touch,
-        lumped::holders_power_w, touch_skin,
+        any_tool_is_near, lumped::holders_power_w, touch_skin,
     },
 };
 use glam::DVec3;
@@ -81,7 +81,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
     /// Kicks, `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and books the work in the ledger, as for a body of tets.
     fn kick(&mut self, environment: &Environment, state: &mut MechanicalState, h_s: f64, ends_long_step: bool) {
         let Self { body, own, scratch } = self;
-        let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, transition, .. } = &mut **scratch;
+        let HybridScratch { patch, accelerations, momenta, of_free_j, kick_sq, .. } = &mut **scratch;
         accelerations.clear();
         accelerations.extend_from_slice(&state.force_n);
         if ends_long_step {
@@ -100,7 +100,7 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         }
         *kick_sq = [patch.mass_matrix_mut().accelerate(accelerations), kick_sq[0], kick_sq[1]];
         let inertia_w = patch.mass_matrix().of_holders(&state.v, accelerations);
-        let taken_j = transition.work_j(&state.v, factor, accelerations, h_s);
+        let taken_j = own.transition_work_j(&state.v, factor, accelerations, h_s);
         state.ledger.dissipated_j += taken_j;
         own.given_j -= taken_j;
         let free_parts = if factor < 1.0 { body.free_parts() } else { &[] };
@@ -142,6 +142,41 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         particles: &mut dyn Iterator<Item = u32>,
     ) {
         self.wake_only(environment, state, particles);
+    }
+
+    fn sleeps_on(&self) -> bool {
+        self.own.is_settled()
+    }
+
+    fn is_apart(&mut self, environment: &Environment, state: &MechanicalState) -> bool {
+        let Self { body, scratch, .. } = self;
+        scratch.patch.displace(body, &state.x);
+        let view = SkinView::new(body, &scratch.patch);
+        environment.contact.is_apart_at(&|vertex| view.position_m(vertex), &state.tools, &state.contact)
+    }
+
+    fn tools_stay_apart(
+        &mut self,
+        environment: &Environment,
+        time: &SubstepTime,
+        state: &mut MechanicalState,
+        contact: &mut ContactScratch,
+    ) -> bool {
+        let Self { body, scratch, .. } = self;
+        let HybridScratch { patch, skin, .. } = &mut **scratch;
+        let model = &environment.contact;
+        let apart = match model.drift_apart(time, &mut state.tools, &mut state.contact, contact) {
+            Drifted::Pushed => false,
+            Drifted::Away => true,
+            Drifted::PerhapsNear => {
+                patch.displace(body, &state.x);
+                !any_tool_is_near(model, &mut SkinView::new(body, patch), skin, state, contact)
+            }
+        };
+        if apart {
+            model.finish_apart(time, &mut state.tools, &mut state.contact, contact);
+        }
+        apart
     }
 
     fn judged(&mut self) -> Option<&mut dyn Judged> {

@@ -37,14 +37,14 @@ pub(crate) struct TransitionForce {
     /// Forces (N) with which accelerations do not jump; empty unless the next evaluation has to find the transition
     /// force.
     due_n: Vec<DVec3>,
-    /// The transition force (N) as it was taken away at the last evaluation.
-    taken_n: Vec<DVec3>,
+    /// A buffer of accelerations (m/s²).
+    accelerations: Vec<DVec3>,
 }
 
 impl TransitionForce {
     pub(super) fn with_room(entries: usize) -> Self {
         let list = || Vec::with_capacity(entries);
-        Self { before: list(), due_n: list(), taken_n: list() }
+        Self { before: list(), due_n: list(), accelerations: list() }
     }
 
     /// Records the accelerations before a switch.
@@ -84,15 +84,15 @@ impl TransitionForce {
             return;
         }
         let nodes = body.node_count();
-        self.taken_n.clear();
-        self.taken_n.extend_from_slice(&self.before[..nodes]);
+        self.accelerations.clear();
+        self.accelerations.extend_from_slice(&self.before[..nodes]);
         let of = |id: &u32| {
             let number = before.binary_search(id).ok();
             number.map_or_else(|| body.partition.anchor(*id).of(&self.before), |number| self.before[nodes + number])
         };
-        self.taken_n.extend(after.iter().map(of));
-        self.due_n.resize(self.taken_n.len(), DVec3::ZERO);
-        mass_matrix.momenta(body, &self.taken_n, &mut self.due_n);
+        self.accelerations.extend(after.iter().map(of));
+        self.due_n.resize(self.accelerations.len(), DVec3::ZERO);
+        mass_matrix.momenta(body, &self.accelerations, &mut self.due_n);
         for (due, transferred) in self.due_n.iter_mut().zip(transferred_n) {
             *due += *transferred;
         }
@@ -102,7 +102,7 @@ impl TransitionForce {
     pub(crate) fn apply(&mut self, body: &HybridBody, own: &mut HybridState, state: &mut MechanicalState) {
         let MechanicalState { x, force_n, .. } = state;
         let may_be = own.may_use_transition_force();
-        let transition_force_n = &mut own.transition_force_n;
+        let HybridState { transition_force_n, transition_taken_n, .. } = own;
         if self.due_n.len() == force_n.len() {
             transition_force_n.clear();
             transition_force_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
@@ -111,7 +111,7 @@ impl TransitionForce {
             }
         }
         self.due_n.clear();
-        self.taken_n.clear();
+        transition_taken_n.clear();
         if transition_force_n.len() != force_n.len() {
             transition_force_n.clear();
             return;
@@ -120,24 +120,24 @@ impl TransitionForce {
             transition_force_n.clear();
             return;
         }
-        self.taken_n.extend_from_slice(transition_force_n);
+        transition_taken_n.extend_from_slice(transition_force_n);
         if body.is_free {
-            without_torque(body, x, &mut self.taken_n);
+            without_torque(body, x, transition_taken_n);
         }
-        for (force, taken) in force_n.iter_mut().zip(&self.taken_n) {
+        for (force, taken) in force_n.iter_mut().zip(&*transition_taken_n) {
             *force -= *taken;
         }
-    }
-
-    /// Returns the work (J) that the body does against the transition force over a kick of length `h_s`, with
-    /// velocities `v` times a factor on free axes, and accelerations (m/s²).
-    pub(crate) fn work_j(&self, v: &[DVec3], factor: f64, accelerations: &[DVec3], h_s: f64) -> f64 {
-        let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
-        h_s * self.taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
     }
 }
 
 impl HybridState {
+    /// Returns the work (J) that the body does against the transition force over a kick of length `h_s`, with
+    /// velocities `v` times a factor on free axes, and accelerations (m/s²).
+    pub(super) fn transition_work_j(&self, v: &[DVec3], factor: f64, accelerations: &[DVec3], h_s: f64) -> f64 {
+        let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
+        h_s * self.transition_taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
+    }
+
     /// Returns whether the decay gave little energy beside the elastic energy that switches changed lately.
     pub(super) fn may_use_transition_force(&self) -> bool {
         self.given_j <= MOST_GIVEN * self.switched_j

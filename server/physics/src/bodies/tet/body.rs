@@ -16,8 +16,8 @@ use crate::{
     mesh::{Surface, TetMesh},
     settings::Integrator,
     tick::{
-        Environment, EnvironmentSpec, Frequencies, PrescribedNodes, Steps, free_inverse_mass, lumped::LumpedMass,
-        progress as building, stiffening,
+        Environment, EnvironmentSpec, Frequencies, NodeMasses, PrescribedNodes, Steps, free_inverse_mass,
+        lumped::LumpedMass, progress as building, stiffening,
     },
 };
 use glam::{BVec3, DVec2, DVec3};
@@ -194,6 +194,11 @@ impl TetBody {
             inverse_mass_per_kg: &self.inverse_mass_per_kg,
         };
         first_free_part(&nodes, self.mesh().tets().iter().map(|tet| &tet[..]))
+    }
+
+    /// Masses for the bound by which it sleeps.
+    pub(super) fn node_masses(&self) -> NodeMasses<'_> {
+        NodeMasses { mass_kg: &self.mass_kg, inverse_mass_per_kg: &self.inverse_mass_per_kg }
     }
 
     /// Masses for kicks.

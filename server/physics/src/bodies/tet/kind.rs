@@ -1,16 +1,16 @@
 //! What a body of tetrahedra is as a kind of body.
-use super::{TetBody, TetElements, TetSpec};
+use super::{TetBody, TetElements, TetSpec, natural_modes};
 use crate::{
-    elements::solid::Solid,
+    elements::{natural_modes::ModesError, solid::Solid},
     hash::{Chain, Fnv},
     material::Law,
-    mesh::TetMesh,
+    mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
-    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MechanicalState},
+    tick::{BodyKind, Energies, Environment, KindSpec, KindState, MechanicalState, NaturalBand, RestBound},
 };
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
-use std::fmt::Write;
+use std::{f64::consts::TAU, fmt::Write};
 
 impl KindSpec for TetSpec {
     fn solid(&self) -> Option<&Solid> {
@@ -69,6 +69,21 @@ impl BodyKind for TetBody {
 
     fn can_be_judged(&self) -> bool {
         true
+    }
+
+    fn rest_bound(&self, surface: &Surface) -> Result<Option<RestBound>, ModesError> {
+        // Without a free node there is no mode, and nothing that could move.
+        let lowest = natural_modes(self, surface, 1)?.first().map_or(f64::INFINITY, |mode| TAU * mode.frequency_hz);
+        let band = NaturalBand {
+            lowest_rad_per_s: lowest,
+            highest_rad_per_s: self.max_natural_frequency_rad_per_s(),
+            left_out: Vec::new(),
+        };
+        Ok(Some(RestBound::new(self.node_masses(), band, self.materials())))
+    }
+
+    fn distance_from_rest_m(&self, bound: &RestBound, _: &TetState, state: &MechanicalState) -> f64 {
+        bound.distance_m(self.node_masses(), |node| state.force_n[node], |node| state.v[node])
     }
 
     fn each_gradient(&self, _: &TetState, x: &[DVec3], each: &mut dyn FnMut(&DMat3, Law, usize)) {

@@ -22,6 +22,7 @@ fn model() -> Model {
                         law: Law::StableNeoHookean,
                         lame: Lame::from_young_poisson(1e4, 0.3).unwrap(),
                         viscosity: Viscosity::default(),
+                        crushing_pa: 0.0,
                     },
                     density_kg_per_m3: 1e3,
                 }],

@@ -254,10 +254,6 @@ fn demand_numerics(document: &Document) -> Result<(), Fault> {
         let message = "a body with particles is integrated by leapfrog only";
         return Err(Fault::value(at.key("integrator"), message).help("leave `integrator` out, or [body.particles]"));
     }
-    if document.numerics.sleep_tolerance_um > 0.0 {
-        let message = "a body with particles does not sleep as a whole: its particles sleep where nothing touches them";
-        return Err(Fault::value(at.key("sleep_tolerance_um"), message).help("leave `sleep_tolerance_um` out"));
-    }
     Ok(())
 }
 

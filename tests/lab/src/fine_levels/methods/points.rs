@@ -48,9 +48,9 @@ impl Role {
         };
         let Viscosity { phi_pa_s, psi_pa_s } = material.viscosity;
         Material {
-            law: material.law,
             lame: Lame { lambda_pa, mu_pa: share * mu_pa },
             viscosity: Viscosity { phi_pa_s: share * phi_pa_s, psi_pa_s: share * psi_pa_s },
+            ..*material
         }
     }
 }

@@ -173,7 +173,7 @@ mod tests {
 
     fn material(law: Law) -> Material {
         let lame = Lame::from_young_poisson(10e3, 0.45).unwrap();
-        Material { law, lame, viscosity: palpate_physics::material::Viscosity::default() }
+        Material { law, lame, viscosity: palpate_physics::material::Viscosity::default(), crushing_pa: 0.0 }
     }
 
     /// Deformed, turned and, the last, inverted.
