@@ -79,7 +79,7 @@ pub(crate) fn lowest_modes(
         let ritz = ritz(&basis, &images, width);
         worst = ritz[..count].iter().map(|r| r.relative_residual).fold(0.0, f64::max);
         if worst <= TOLERANCE {
-            return Ok(ritz[..count].iter().map(|r| r.mode(&axes, &root_mass)).collect());
+            return Ok(ritz[..count].iter().map(|r| r.mode(axes, &root_mass)).collect());
         }
         basis = ritz.into_iter().map(|r| r.image).collect();
         orthonormalise(&mut basis);

@@ -99,22 +99,19 @@ pub fn step(model: &Model, state: &mut State, scratch: &mut Scratch, input: &Tic
     };
     write_reactions(environment, &body, mechanical, reaction_n);
     mechanical.tick = mechanical.tick.saturating_add(1);
-    match spoilt {
-        Some(place) => {
-            last_good.put_back(mechanical);
-            let entered = enter_quarantine(environment, place, &mut body, mechanical, pace, history.is_kept());
-            reaction_n.fill(DVec3::ZERO);
-            sleep.wake();
-            *quarantine = Some(entered);
-            report.quarantined = Some(entered);
-        }
-        None => {
-            let was_quiet = was_quiet && report.inputs_rejected == 0;
-            if sleep::is_to_be_considered(model, mechanical.tick, sleep, input, was_quiet) {
-                let is_apart = body.is_apart(environment, mechanical);
-                sleep::consider(model, own, mechanical, sleep, pace, is_apart);
-            }
-        }
+    if let Some(place) = spoilt {
+        last_good.put_back(mechanical);
+        let entered = enter_quarantine(environment, place, &mut body, mechanical, pace, history.is_kept());
+        reaction_n.fill(DVec3::ZERO);
+        sleep.wake();
+        *quarantine = Some(entered);
+        report.quarantined = Some(entered);
+        return report;
+    }
+    let was_quiet = was_quiet && report.inputs_rejected == 0;
+    if sleep::is_to_be_considered(model, mechanical.tick, sleep, input, was_quiet) {
+        let is_apart = body.is_apart(environment, mechanical);
+        sleep::consider(model, own, mechanical, sleep, pace, is_apart);
     }
     report
 }

@@ -15,7 +15,7 @@ use crate::{
     },
     linalg::cholesky::LowerTriangle,
 };
-use glam::{BVec3, DVec3};
+use glam::DVec3;
 use std::f64::consts::TAU;
 
 /// Number of modes among which the lowest that is felt is looked for.
@@ -42,7 +42,7 @@ impl HybridBody {
             return Err(ModesError::UnderConstrained(part));
         }
         let free = self.inverse_mass_per_kg.iter().map(|inverse_mass| inverse_mass.cmpne(DVec3::ZERO));
-        let axes = FreeAxes::numbered(free.map(BVec3::from));
+        let axes = FreeAxes::numbered(free);
         let mut modes = lowest_modes(&self.coarse_stiffness(&axes), &axes, &self.masses.node_kg, MODES)?;
         // Where none of them is felt, the lowest is as good as any, and nothing will be found at rest.
         let first_felt = modes.iter().position(|mode| self.felt(&mode.shape_per_sqrt_kg) > UNFELT).unwrap_or_default();
