@@ -74,7 +74,7 @@ fn what_a_probe_tells_is_told_at_the_end_whatever_a_tick_lasts() {
     let laws = ["stable-neo-hookean", "stvk"];
     for (law, period_ms) in laws.iter().flat_map(|law| ["0.5", "1", "2", "4"].map(|period_ms| (law, period_ms))) {
         let scene = format!(
-            "[scene]\nname = \"jab\"\ntick_period_s = {period_ms}e-3\n[body]\noffset_mm = [-20, -20, -20]\n[body.box]\nsize_mm = [40, 40, 20]\ncells = [6, 6, 4]\n\
+            "[scene]\nname = \"jab\"\ntick_period_s = {period_ms}e-3\n[body]\nelements = \"linear\"\noffset_mm = [-20, -20, -20]\n[body.box]\nsize_mm = [40, 40, 20]\ncells = [6, 6, 4]\n\
              [[material]]\nlaw = \"{law}\"\nyoung_modulus_pa = 10e3\npoisson_ratio = 0.45\ndensity_kg_per_m3 = 1000\n\
              [[fixed]]\nregion = \"z_min\"\n[[tool]]\nname = \"finger\"\nradius_mm = 4\ncoupling = \"rigid\"\ndriver = \"script\"\n\
              keyframe = [{{ time_s = 0, position_mm = [0, 0, 5] }}, {{ time_s = 0.004, position_mm = [0, 0, -11] }},\n\

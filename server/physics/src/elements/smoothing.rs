@@ -7,10 +7,10 @@
 //! λ⁺ = max(λ, 0), λ⁻ = min(λ, 0), γ = 0.3
 //! ```
 //! (every law's Ψ is linear in λ and µ). Around nodes alone some motions would cost nothing: the tets' own part γ holds them.
-//! Volume is kept around nodes alone, or the tets would lock; but a tet that is pressed to half of its volume resists
-//! ([`crate::material::crushing_limit`]), or tools that press deep would turn single tets inside out. Viscosity is divided as µ is. Tets of different regions are
-//! not averaged: a node between two regions has a point of each. (Nodal averages: Dohrmann et al. 2000, Bonet & Burton 1998;
-//! stabilised: Puso & Solberg 2006.)
+//! Volume is kept around nodes alone, or the tets would lock; but a tet that is pressed to less than half of its volume
+//! resists ([`crate::material::crushing_limit`]), or tools that press deep would turn single tets inside out. Viscosity is
+//! divided as µ is. Tets of different regions are not averaged: a node between two regions has a point of each. (Nodal
+//! averages: Dohrmann et al. 2000, Bonet & Burton 1998; stabilised: Puso & Solberg 2006.)
 use super::{integration_points::IntegrationPoints, linear_tet::RestTet};
 use crate::{
     material::{Lame, Material, Viscosity},

@@ -8,10 +8,11 @@
 //! P_C = −κ w cof F
 //! δP_C = κ (cof F : δF) cof F − κ w δ(cof F)        for w > 0
 //! ```
-//! Above `J₀` nothing changes, not by a bit. The stress has no jump. A body's volume ratio never comes near ½ under loads
-//! that tissue bears; that of single tets beside a tool that is pressed deep does.
-use super::lane_matrix::M3;
-use super::lane_strain::{cofactor_and_volume_change, volumetric_differential};
+//! Above `J₀` nothing changes, not by a bit. The stress has no jump.
+use super::{
+    lane_matrix::M3,
+    lane_strain::{cofactor_and_volume_change, volumetric_differential},
+};
 use crate::{
     lanes::real::Real,
     linalg::tensor::{cofactor, cofactor_differential, contract},
