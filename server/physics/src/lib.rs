@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `hash` | hashes that are the same on every machine: of what prints, and of every bit of every tick |
 //! | [`settings`] | how a scene is computed; loads and constraints |
-//! | [`linalg`] | conjugate gradients, Lanczos' method, sparse Cholesky, small eigenproblems |
+//! | [`linalg`] | conjugate gradients, Lanczos' method, sparse Cholesky, nested dissection, small eigenproblems |
 //! | [`lanes`] | vectors of numbers, instruction sets, operations on whole lists: all the `unsafe` |
 //! | [`mesh`] | tetrahedra and surfaces |
 //! | [`material`] | constitutive laws |

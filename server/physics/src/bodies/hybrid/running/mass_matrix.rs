@@ -11,6 +11,7 @@ use crate::{
         dense::{Cholesky, Symmetric},
         vector_operations,
     },
+    linalg::dissection,
 };
 use glam::{BVec3, DVec3};
 
@@ -30,12 +31,14 @@ pub(crate) struct RunningMassMatrix {
     inverse_per_kg: Vec<DVec3>,
     /// The masses that active particles take from the nodes they follow.
     followed: Vec<Followed>,
-    /// Nodes that active particles follow, which are the rows of the block: first the free ones, then the held ones,
-    /// each ascending.
+    /// Nodes that active particles follow, which are the rows of the block: first the free ones, then the held ones, each by
+    /// `places`.
     touched: Vec<u32>,
     /// Number of those that are free; they are the rows of the factor.
     free_rows: usize,
     row_of: Vec<u32>,
+    /// The order of all coarse nodes in which the factor has few entries.
+    places: Vec<u32>,
     /// The dense block of `M'` (kg), row by row.
     block_kg: Vec<f64>,
     factor: Cholesky,
@@ -61,6 +64,24 @@ fn inverse_per_kg(hybrid: &HybridBody, node: usize) -> DVec3 {
     DVec3::select(hybrid.free[node], DVec3::splat(1.0 / mass_kg), DVec3::ZERO)
 }
 
+/// Returns the order of the coarse nodes by nested dissection: neighbours are nodes that a particle follows together.
+fn places(hybrid: &HybridBody) -> Vec<u32> {
+    let partition = &hybrid.partition;
+    let mut neighbours = vec![Vec::new(); hybrid.node_count()];
+    for particle in 0..partition.particle_count() as u32 {
+        let anchor = partition.anchor(particle);
+        for (one, _) in weighty(&anchor) {
+            for (other, _) in weighty(&anchor).filter(|(other, _)| *other != one) {
+                let of_one: &mut Vec<u32> = &mut neighbours[one as usize];
+                if !of_one.contains(&other) {
+                    of_one.push(other);
+                }
+            }
+        }
+    }
+    dissection::places(hybrid.rest_positions_m(), &neighbours)
+}
+
 impl RunningMassMatrix {
     pub(in crate::bodies::hybrid) fn new(hybrid: &HybridBody, most_active: usize) -> Self {
         let nodes = hybrid.node_count();
@@ -75,6 +96,7 @@ impl RunningMassMatrix {
             touched: Vec::with_capacity(most_touched),
             free_rows: 0,
             row_of: vec![NONE; nodes],
+            places: places(hybrid),
             block_kg: Vec::with_capacity(most_touched * most_touched),
             factor: Cholesky::with_room(most_touched),
         }
@@ -104,7 +126,8 @@ impl RunningMassMatrix {
             }
         }
         let is_held = |node: u32| !hybrid.free[node as usize].any();
-        self.touched.sort_unstable_by_key(|&node| (is_held(node), node));
+        let places = &self.places;
+        self.touched.sort_unstable_by_key(|&node| (is_held(node), places[node as usize]));
         self.free_rows = self.touched.partition_point(|&node| !is_held(node));
         let size = self.touched.len();
         self.block_kg.clear();
