@@ -5,6 +5,7 @@
 //! fills nothing of the factor in another part's rows. An order of all nodes serves any of them: what is left of a separator
 //! separates what is left of its parts.
 use glam::DVec3;
+use std::ops::Range;
 
 /// Number of nodes that are not cut further.
 const SMALL: usize = 8;
@@ -15,7 +16,7 @@ pub(crate) fn places(positions_m: &[DVec3], neighbours: &[Vec<u32>]) -> Vec<u32>
     let mut part_of = vec![0_u32; positions_m.len()];
     let mut parts = 0;
     // Ranges of the order that are to be cut, and the number of the cut.
-    let mut open = vec![0..order.len()];
+    let mut open: Vec<Range<usize>> = std::iter::once(0..order.len()).collect();
     while let Some(range) = open.pop() {
         if range.len() <= SMALL {
             continue;
@@ -30,7 +31,9 @@ pub(crate) fn places(positions_m: &[DVec3], neighbours: &[Vec<u32>]) -> Vec<u32>
         nodes.sort_unstable_by(|a, b| at(*a)[axis].total_cmp(&at(*b)[axis]).then(a.cmp(b)));
         let (one, other) = nodes.split_at(nodes.len() / 2);
         parts += 1;
-        other.iter().for_each(|&node| part_of[node as usize] = parts);
+        for &node in other {
+            part_of[node as usize] = parts;
+        }
         let separates = |node: u32| neighbours[node as usize].iter().any(|n| part_of[*n as usize] == parts);
         let (separator, rest): (Vec<u32>, Vec<u32>) = one.iter().copied().partition(|&node| separates(node));
         let (first, second) = (rest.len(), other.len());
