@@ -52,10 +52,11 @@ pub(crate) fn places(positions_m: &[DVec3], neighbours: &[Vec<u32>]) -> Vec<u32>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     /// Number of entries below the diagonal of the factor of a matrix that couples neighbours, eliminated in an order.
     fn entries_of_factor(neighbours: &[Vec<u32>], places: &[u32]) -> usize {
-        let mut columns: Vec<std::collections::BTreeSet<u32>> = vec![Default::default(); places.len()];
+        let mut columns: Vec<BTreeSet<u32>> = vec![BTreeSet::new(); places.len()];
         for (node, of_node) in neighbours.iter().enumerate() {
             columns[places[node] as usize]
                 .extend(of_node.iter().map(|n| places[*n as usize]).filter(|p| *p > places[node]));
