@@ -8,7 +8,7 @@ use crate::{
     bodies::{Body, SteppedBody, tet::TetBody},
     contact::ContactScratch,
     elements::rest_stiffness::nodal_stiffness_n_per_m,
-    material::{Lame, Law, Material, Viscosity},
+    material::Material,
     settings::Integrator,
     tick::{Environment, MechanicalState, Tick},
 };
@@ -39,7 +39,7 @@ impl Scheme {
             (Integrator::SeedSemiImplicit, Some(body)) => Self::SeedSemiImplicit(nodal_implicit(body, dt_s)),
             (Integrator::BackwardEuler, Some(body)) => {
                 let (points, nodes) = (body.points(), body.mass_kg().len());
-                let viscous = nodal_stiffness_n_per_m(&points.with_materials(viscosity_as_stiffness), nodes);
+                let viscous = nodal_stiffness_n_per_m(&points.with_materials(Material::viscosity_as_stiffness), nodes);
                 let nodal = nodal_stiffness_n_per_m(points, nodes);
                 Self::BackwardEuler(NodalImplicit::new(&nodal, Some(&viscous), body, dt_s))
             }
@@ -73,10 +73,4 @@ impl Scheme {
 
 fn nodal_implicit(body: &TetBody, dt_s: f64) -> NodalImplicit {
     NodalImplicit::new(&nodal_stiffness_n_per_m(body.points(), body.mass_kg().len()), None, body, dt_s)
-}
-
-/// A material that at rest answers strain as this one's viscosity answers its rate: λ = φ, µ = ψ.
-fn viscosity_as_stiffness(material: &Material) -> Material {
-    let Viscosity { phi_pa_s, psi_pa_s } = material.viscosity;
-    Material { lame: Lame { lambda_pa: phi_pa_s, mu_pa: psi_pa_s }, law: Law::StVenantKirchhoff, ..*material }
 }

@@ -118,6 +118,17 @@ impl Material {
         self.law.stretched_modulus_pa(lame, stretch * stretch) / lame.p_wave_modulus_pa()
     }
 
+    /// Returns a material that at rest answers strain as this one's viscosity answers its rate: λ = φ, µ = ψ.
+    pub(crate) fn viscosity_as_stiffness(&self) -> Self {
+        let Viscosity { phi_pa_s, psi_pa_s } = self.viscosity;
+        Self {
+            law: Law::StVenantKirchhoff,
+            lame: Lame { lambda_pa: phi_pa_s, mu_pa: psi_pa_s },
+            viscosity: Viscosity::default(),
+            crushing_pa: 0.0,
+        }
+    }
+
     /// Returns the material of shape alone, `(λ⁻, µ)` with `λ⁻ = min(λ, 0)`, and that of volume alone, `(λ − λ⁻, 0)`. Every
     /// law's energy is linear in λ and µ, so theirs sum to this one's.
     pub(crate) fn shape_and_volume(&self) -> (Self, Self) {

@@ -32,4 +32,4 @@ pub use material_point::MaterialPoint;
 pub(crate) use rest_bound::{NaturalBand, NodeMasses, RestBound};
 pub(crate) use skin::{CarriedSkin, ListedVertices, Touch, any_tool_is_near, touch_skin};
 pub use state::MechanicalState;
-pub(crate) use substeps::{Frequencies, Steps, StifferContact, relaxation_time_s, stiffening};
+pub(crate) use substeps::{Frequencies, Steps, StifferContact, damping_growth, relaxation_time_s, stiffening};

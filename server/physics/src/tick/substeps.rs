@@ -27,13 +27,23 @@ pub(crate) struct StifferContact {
     pub(crate) walls_sq: f64,
 }
 
-/// Largest frequencies of a body (rad/s).
+/// Largest frequencies (rad/s) and the largest rate of damping (1/s) of a body at rest, or stretched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Frequencies {
     /// Where nothing touches it.
     pub(crate) alone: f64,
     /// Touched everywhere, tools on their couplings included.
     pub(crate) touched: f64,
+    /// `λ_max(M^{-½} C M^{-½})`, with the damping matrix C of viscous stress; 0 where nothing is viscous.
+    pub(crate) damping_per_s: f64,
+}
+
+/// Returns the factor by which the largest rate of damping grows at the allowed stretch s, `s²`.
+///
+/// Viscous stress takes the power `∫ φ tr²Ė + 2ψ|Ė|² dV`, `Ė = sym(Fᵀ ∇v)`. Where `F` is the same all over, that is the
+/// power at rest of the velocities `Fᵀ v`, which are s times as large at most.
+pub(crate) fn damping_growth(settings: &Settings) -> f64 {
+    settings.stretch_allowance.powi(2)
 }
 
 /// The substeps of a tick.
@@ -54,21 +64,23 @@ pub(crate) struct Steps {
 }
 
 impl Steps {
-    /// Returns the substeps with which leapfrog is stable: `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`.
+    /// Returns the substeps with which leapfrog is stable, whose viscous forces are those of velocities half a step ago:
+    /// `dt = safety · (2/ω)(√(1 + ξ²) − ξ)`, `ξ = c/2ω`.
     ///
     /// Here ω is the largest frequency of the body stretched by s and touched everywhere,
-    /// `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with the laws' stiffening χ, and ξ is the damping ratio at ω.
-    /// Viscous stress grows with s⁴ (`P_v = F S_v`, `Ė = sym(Ḟᵀ F)`), so that `ξ = ½ ω τ s⁴/χ`, where τ is the largest
-    /// ratio of viscosity to stiffness over P-waves, shear and bulk: `(φ + 2ψ)/(λ + 2µ)`, `ψ/µ`, `(φ + ⅔ψ)/(λ + ⅔µ)`.
+    /// `ω² = λ_max(M^{-½} (χK + K_contact) M^{-½})` with the laws' stiffening χ, and `c = s² λ_max(M^{-½} C M^{-½})`.
+    /// A motion `zⁿ a` is one of leapfrog if `((z − 1)² M + (z − 1) dt C + z dt² K) a = 0`. Its product with `ā` is a
+    /// quadratic equation with the real numbers m, c, k of `ā·Ma`, `ā·Ca` and `ā·Ka`, and its roots are `|z| ≤ 1` as long as
+    /// `dt² k + 2 dt c ≤ 4 m`. So all motions are stable where `dt² K + 2 dt C ≤ 4 M`, for which
+    /// `dt² ω² + 2 dt c ≤ 4` is enough: the step above, without the safety, is where both sides are the same.
     ///
     /// # Errors
     /// The body needs more than [`MAX_SUBSTEPS`].
     pub(crate) fn choose(
         settings: &Settings,
-        materials: &[Material],
-        Frequencies { alone, touched: omega }: Frequencies,
+        Frequencies { alone, touched: omega, damping_per_s }: Frequencies,
     ) -> Result<Self, EnvironmentError> {
-        let wanted = wanted(settings, materials, omega);
+        let wanted = wanted(settings, omega, damping_per_s);
         let for_viscosity = wanted.max(1.0) / wanted_without_viscosity(settings, omega).max(1.0);
         let all_short = |substeps: u32| Self {
             substeps,
@@ -86,7 +98,7 @@ impl Steps {
             Ok(all_short(substeps as u32))
         } else {
             let most = f64::from(MAX_SUBSTEPS);
-            let asked_by = if self::wanted(settings, materials, alone) <= most {
+            let asked_by = if self::wanted(settings, alone, damping_per_s) <= most {
                 AskedBy::Tools
             } else if wanted_without_viscosity(settings, alone) <= most {
                 AskedBy::Viscosity
@@ -115,10 +127,10 @@ impl Steps {
     }
 
     /// Returns the same substeps for a body whose coarse level may take longer steps; `omega` (rad/s) is the largest
-    /// frequency of that level when it is stretched.
+    /// frequency of that level when it is stretched, `damping_per_s` its largest rate of damping.
     #[must_use]
-    pub(crate) fn with_long_steps(self, settings: &Settings, materials: &[Material], omega: f64) -> Self {
-        let least = wanted(settings, materials, omega / LONG_STEP_FRACTION).ceil().max(1.0);
+    pub(crate) fn with_long_steps(self, settings: &Settings, omega: f64, damping_per_s: f64) -> Self {
+        let least = (wanted(settings, omega, damping_per_s) / LONG_STEP_FRACTION).ceil().max(1.0);
         if !settings.long_coarse_steps || least >= f64::from(self.substeps) {
             return self;
         }
@@ -141,11 +153,11 @@ fn wanted_without_viscosity(settings: &Settings, omega: f64) -> f64 {
     settings.tick_period_s * omega / (2.0 * settings.step_safety)
 }
 
-fn wanted(settings: &Settings, materials: &[Material], omega: f64) -> f64 {
-    let viscous_growth = settings.stretch_allowance.powi(4) / stiffening(settings, materials);
-    let xi = 0.5 * omega * viscous_growth * materials.iter().map(relaxation_time_s).fold(0.0, f64::max);
-    let dt_s = settings.step_safety * 2.0 / omega * ((1.0 + xi * xi).sqrt() - xi);
-    settings.tick_period_s / dt_s
+/// Returns how many substeps are enough: `(ω/2)(√(1 + ξ²) + ξ)` to a second, over the safety; `ξ = c/2ω`.
+fn wanted(settings: &Settings, omega: f64, damping_per_s: f64) -> f64 {
+    // 1/(√(1 + ξ²) − ξ) = √(1 + ξ²) + ξ
+    let per_s = 0.5 * ((omega * omega + 0.25 * damping_per_s * damping_per_s).sqrt() + 0.5 * damping_per_s);
+    settings.tick_period_s * per_s / settings.step_safety
 }
 
 /// Returns the largest ratio of viscosity to stiffness (s) over P-waves, shear and bulk.
@@ -155,4 +167,39 @@ pub(crate) fn relaxation_time_s(material: &Material) -> f64 {
         (lambdas * viscosity.phi_pa_s + mus * viscosity.psi_pa_s) / (lambdas * lame.lambda_pa + mus * lame.mu_pa)
     };
     ratio(1.0, 2.0).max(ratio(0.0, 1.0)).max(ratio(1.0, 2.0 / 3.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the largest modulus of a factor `z` by which a motion with frequency ω and damping c changes in a step:
+    /// `z² − (2 − dt²ω² − dt c) z + 1 − dt c = 0`.
+    fn largest_factor(omega: f64, damping_per_s: f64, dt_s: f64) -> f64 {
+        let product = 1.0 - dt_s * damping_per_s;
+        let half_sum = 0.5 * (1.0 + product - (dt_s * omega).powi(2));
+        let square = half_sum * half_sum - product;
+        if square < 0.0 { product.sqrt() } else { half_sum.abs() + square.sqrt() }
+    }
+
+    #[test]
+    fn the_longest_step_is_at_the_edge_of_stability() {
+        let settings = Settings { step_safety: 1.0, ..Settings::default() };
+        for omega in [1.0, 300.0, 5e4] {
+            for xi in [0.0, 0.02, 0.5, 3.0, 100.0] {
+                let damping_per_s = 2.0 * omega * xi;
+                let dt_s = settings.tick_period_s / wanted(&settings, omega, damping_per_s);
+                let [below, above] = [0.999, 1.001].map(|part| largest_factor(omega, damping_per_s, part * dt_s));
+                assert!(below <= 1.0 && above > 1.0, "{omega}, {xi}: {below} {above}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_body_without_stiffness_or_viscosity_needs_no_step() {
+        let settings = Settings::default();
+        assert_eq!(wanted(&settings, 0.0, 0.0), 0.0);
+        let damped = wanted(&settings, 0.0, 1e3);
+        assert!((damped - 0.5 / settings.step_safety).abs() < 1e-12, "{damped}");
+    }
 }

@@ -4,7 +4,10 @@ use crate::{
     contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, moduli},
     mesh::Surface,
     settings::Integrator,
-    tick::{Environment, EnvironmentSpec, Frequencies, Steps, free_inverse_mass, progress as building, stiffening},
+    tick::{
+        Environment, EnvironmentSpec, Frequencies, Steps, damping_growth, free_inverse_mass, progress as building,
+        stiffening,
+    },
 };
 use glam::{DVec2, DVec3};
 
@@ -73,9 +76,11 @@ impl HybridBody {
         };
         let omega_sq = stretch_sq * touched.max(omega).powi(2) + contact.tool_frequency_sq;
         let alone = stretch_sq.sqrt() * omega;
+        let damping_per_s = damping_growth(&around.settings) * hybrid.damping_per_s(&mut building::damped(progress));
+        let steps = Steps::choose(&around.settings, Frequencies { alone, touched: omega_sq.sqrt(), damping_per_s })?;
         let coarse_omega = stretch_sq.sqrt() * hybrid.coarse_frequency_rad_per_s();
-        let steps = Steps::choose(&around.settings, &materials, Frequencies { alone, touched: omega_sq.sqrt() })?;
-        let steps = steps.with_long_steps(&around.settings, &materials, coarse_omega);
+        let coarse_damping_per_s = damping_growth(&around.settings) * hybrid.coarse_damping_per_s();
+        let steps = steps.with_long_steps(&around.settings, coarse_omega, coarse_damping_per_s);
         Ok((hybrid, Environment::new(around, surface, contact, steps)))
     }
 }

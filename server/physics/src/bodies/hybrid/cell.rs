@@ -103,7 +103,7 @@ impl RestCell {
             stress += viscous::piola(material.viscosity, &f, &f_dot);
             power_w = self.volume_m3 * viscous::power_density(material.viscosity, &f, &f_dot);
         }
-        (self.corner_forces_n(material, &stress, &self.stiffened(&self.amplitudes(y))), power_w)
+        (self.corner_forces_n(material.lame.mu_pa, &stress, &self.stiffened(&self.amplitudes(y))), power_w)
     }
 
     /// Returns `−K a` (N), the change of the elastic forces along `a`.
@@ -116,7 +116,7 @@ impl RestCell {
         let stiffened = force_factor(growth);
         let grown = hourglass_growth::slope(growth) * 2.0 * self.growth_per_m2 * along;
         let changes = std::array::from_fn(|k| dq[k] * stiffened + q[k] * grown);
-        self.corner_forces_n(material, &change, &changes)
+        self.corner_forces_n(material.lame.mu_pa, &change, &changes)
     }
 
     /// Returns `φ q_k` (m).
@@ -137,8 +137,8 @@ impl RestCell {
         })
     }
 
-    pub(super) fn corner_forces_n(&self, material: &Material, stress: &DMat3, amplitudes: &[DVec3; 4]) -> [DVec3; 8] {
-        let kappa = self.hourglass_m * material.lame.mu_pa;
+    pub(super) fn corner_forces_n(&self, hourglass_pa: f64, stress: &DMat3, amplitudes: &[DVec3; 4]) -> [DVec3; 8] {
+        let kappa = self.hourglass_m * hourglass_pa;
         std::array::from_fn(|p| {
             let modes: DVec3 = (0..4).map(|k| amplitudes[k] * (MODE_WEIGHTS[k] * self.modes[k][p])).sum();
             *stress * self.gradients_per_m[p] * -self.volume_m3 - modes * kappa

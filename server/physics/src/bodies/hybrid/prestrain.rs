@@ -332,7 +332,7 @@ impl CellPrestrain {
             power_w = rest.volume_m3 * viscous::power_density(material.viscosity, &f, &f_dot);
         }
         let amplitudes = rest.stiffened(&rest.amplitudes(y)).map(|q| q * (1.0 - self.modes));
-        (rest.corner_forces_n(material, &stress, &amplitudes), power_w)
+        (rest.corner_forces_n(material.lame.mu_pa, &stress, &amplitudes), power_w)
     }
 }
 

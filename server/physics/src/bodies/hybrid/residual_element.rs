@@ -179,6 +179,13 @@ impl ResidualElement {
         self.scatter(&stresses, products_n);
     }
 
+    /// Adds `−C v` (N), the forces of viscous stress at rest.
+    pub(super) fn add_damping_products_n(&self, material: &Material, v: &[DVec3], products_n: &mut [DVec3]) {
+        let mut stresses = [DMat3::ZERO; PARTS];
+        self.add_viscous_pa(material, &[DMat3::IDENTITY; PARTS], v, &mut stresses);
+        self.scatter(&stresses, products_n);
+    }
+
     /// Adds the diagonal blocks (N/m) of the stiffness at rest.
     pub fn add_diagonal_n_per_m(&self, material: &Material, blocks: &mut [DMat3]) {
         let (of_shape, of_volume) = material.shape_and_volume();

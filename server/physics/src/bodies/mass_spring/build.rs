@@ -41,7 +41,8 @@ impl MassSpringBody {
         let contact = if is_hollow { contact.hollow() } else { contact };
         body.cluster(contact.triangles());
         let omega_sq = body.model().touched_frequency_sq(&contact.nodal_stiffness_n_per_m) + contact.tool_frequency_sq;
-        let steps = Steps::choose(&around.settings, &[], Frequencies { alone: omega, touched: omega_sq.sqrt() })?;
+        let frequencies = Frequencies { alone: omega, touched: omega_sq.sqrt(), damping_per_s: 0.0 };
+        let steps = Steps::choose(&around.settings, frequencies)?;
         free_inverse_mass(&body.model().spec().mass_kg, &around.prescribed)?;
         Ok((body, Environment::new(around, surface, contact, steps)))
     }

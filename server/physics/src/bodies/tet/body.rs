@@ -16,8 +16,8 @@ use crate::{
     mesh::{Surface, TetMesh},
     settings::Integrator,
     tick::{
-        Environment, EnvironmentSpec, Frequencies, NodeMasses, PrescribedNodes, Steps, free_inverse_mass,
-        lumped::LumpedMass, progress as building, stiffening,
+        Environment, EnvironmentSpec, Frequencies, NodeMasses, PrescribedNodes, Steps, damping_growth,
+        free_inverse_mass, lumped::LumpedMass, progress as building, stiffening,
     },
 };
 use glam::{BVec3, DVec2, DVec3};
@@ -103,9 +103,13 @@ impl TetBody {
             Integrator::BackwardEuler => 0.0,
             _ => stretch_sq * touched.max(omega).powi(2),
         };
+        let damping_per_s = match settings.integrator {
+            Integrator::BackwardEuler => 0.0,
+            _ => damping_growth(settings) * body.damping_per_s(&mut building::damped(progress)),
+        };
         let omega_sq = explicit_sq + contact.tool_frequency_sq;
         let alone = stretch_sq.sqrt() * omega;
-        let steps = Steps::choose(settings, &body.materials, Frequencies { alone, touched: omega_sq.sqrt() })?;
+        let steps = Steps::choose(settings, Frequencies { alone, touched: omega_sq.sqrt(), damping_per_s })?;
         body.max_natural_frequency_rad_per_s = omega;
         let environment = Environment::new(spec, surface, contact, steps).with_inner_nodes(nodes);
         Ok((body, environment))

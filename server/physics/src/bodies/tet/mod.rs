@@ -1,5 +1,6 @@
 //! A body of tetrahedra throughout.
 mod body;
+mod damping;
 mod error;
 mod judged;
 mod kind;
