@@ -39,7 +39,8 @@ fn with_viscosity(mut spec: ModelSpec, viscosity: Viscosity) -> ModelSpec {
     spec
 }
 
-/// Returns the number of substeps, and the energy after some ticks over that at the start; infinite where the body was given up.
+/// Returns the number of substeps, and the energy after some ticks over that at the start: infinite where the body was
+/// given up.
 fn growth(spec: &ModelSpec, substeps: Substeps, wake: bool) -> (u32, f64) {
     let mut rig = Rig::new(ModelSpec { settings: Settings { substeps, ..spec.settings }, ..spec.clone() });
     if wake {
@@ -59,8 +60,8 @@ fn growth(spec: &ModelSpec, substeps: Substeps, wake: bool) -> (u32, f64) {
     (substeps, Energies::of(&rig.model, &rig.state).held_j() / start_j)
 }
 
-/// The rule adds the largest of both eigenvalues, which the modes of one body need not have in common; and it is made for all
-/// particles awake, of which the hybrid body has a part. So it is above the edge, by less than a tenth and a fifth here.
+/// The rule adds the largest eigenvalues of stiffness and of damping, which no mode need have both; and it is made for
+/// all particles awake, of which the hybrid body has a part. So it is above the edge, by less than a tenth and a fifth.
 #[test]
 fn a_viscous_body_is_stable_in_its_substeps_and_not_in_a_few_less() {
     for (what, spec, wake) in [

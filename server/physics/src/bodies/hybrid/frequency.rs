@@ -305,7 +305,9 @@ mod tests {
                 let accelerated = |(n, (f, m)): (usize, (&DVec3, &f64))| *f * free(n) / m.max(f64::MIN_POSITIVE);
                 v = force_n.iter().zip(mass_kg).enumerate().map(accelerated).collect();
                 found = v.iter().map(|v| v.length_squared()).sum::<f64>().sqrt() / before;
-                v.iter_mut().for_each(|v| *v *= 1.0 / (found * before));
+                for v in &mut v {
+                    *v *= 1.0 / (found * before);
+                }
             }
             found
         };

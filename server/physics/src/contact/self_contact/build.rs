@@ -1,8 +1,9 @@
 //! Builds self-contact from the body at rest.
 use super::{
+    bounds::Ball,
     compact::compact,
     lists::NearWalls,
-    query::{Ball, WallScratch},
+    query::WallScratch,
     rest::{
         CloseCluster, ClusterAtRest, FACING, FREQUENCY_FRACTION, MARGIN, NodeAtRest, Rows, STIFFNESS_RATIO,
         SelfContact, twice_area_m2,
@@ -17,7 +18,7 @@ use glam::DVec3;
 /// Clusters nearer at rest than so many mean edges of the skin are close.
 const CLOSE: f64 = 8.0;
 /// How far the surface may move at least between two queries, over the mean edge.
-const STRIDE: f64 = 0.25;
+const STRIDE: f64 = 0.5;
 /// Gap at rest over the size of the skin's triangles below which the body lies against itself.
 const AGAINST_ITSELF: f64 = 0.02;
 /// Least part of the stiffness that counts as borne.
@@ -105,9 +106,24 @@ impl SelfContact {
             of_triangles.dedup();
             all.push(of_triangles);
             let far = f64::INFINITY;
-            self.clusters.push(ClusterAtRest { low_m, high_m, free_close_m: far, free_far_m: far });
+            let turns_with = self.far_apart(&all[cluster]);
+            self.clusters.push(ClusterAtRest { low_m, high_m, free_close_m: far, free_far_m: far, turns_with });
         }
         (self.of_cluster, self.of_triangles) = (Rows::of(own), Rows::of(all));
+    }
+
+    /// Returns three of some vertices: the farthest from the first, the farthest from that, and the one that spans the
+    /// largest triangle with them.
+    fn far_apart(&self, nodes: &[u32]) -> [u32; 3] {
+        let at = |node: u32| self.rest_m[node as usize];
+        let most = |size: &dyn Fn(DVec3) -> f64| {
+            let larger = |one: &&u32, other: &&u32| size(at(**one)).total_cmp(&size(at(**other)));
+            nodes.iter().max_by(larger).copied().unwrap_or(nodes[0])
+        };
+        let first = most(&|p| p.distance_squared(at(nodes[0])));
+        let second = most(&|p| p.distance_squared(at(first)));
+        let third = most(&|p| (p - at(first)).cross(at(second) - at(first)).length_squared());
+        [first, second, third]
     }
 
     /// Finds normals, sizes and stiffness of the surface's nodes, and what part of it their masses bear: a vertex and the
@@ -239,7 +255,10 @@ impl SelfContact {
         let near = self.near_at(&self.rest_m);
         for of_vertex in near.pairs().chunk_by(|one, next| one.node == next.node) {
             let node = of_vertex[0].node;
-            let Some(gap) = self.gap(node, &of_vertex.iter().map(|pair| pair.triangle), &self.rest_m) else { continue };
+            let Some(gap) = self.gap(node, f64::INFINITY, &of_vertex.iter().map(|pair| pair.triangle), &self.rest_m)
+            else {
+                continue;
+            };
             let at = &mut self.nodes[node as usize];
             at.margin_m = at.margin_m.min(OF_GAP * gap.distance_m);
             if gap.distance_m < AGAINST_ITSELF * at.size_m {

@@ -14,7 +14,10 @@
 //! ```
 //! with the weights `β` of the foot of `y` on the plane, which may be negative, and `w` of `p`. On the rim itself, at
 //! `δ = 0`, both gaps are the same and `F` has neither slope nor curvature.
-use super::rest::{SelfContact, twice_area_m2};
+use super::{
+    facing::OwnTriangles,
+    rest::{SelfContact, twice_area_m2},
+};
 use crate::contact::triangle::closest_weights;
 use glam::DVec3;
 
@@ -22,6 +25,8 @@ use glam::DVec3;
 const NO_DISTANCE_M: f64 = 1e-12;
 /// `D/m`.
 const FADES_WITHIN: f64 = 2.0;
+/// Part of a squared distance that is more than rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// The gap between a vertex and a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,9 +60,16 @@ struct Nearest {
 
 impl SelfContact {
     /// Returns the gap between a vertex and the nearest of these triangles (ascending) that face it, where any is within
-    /// its reach; nodes are at `x` (m).
-    pub(super) fn gap(&self, node: u32, triangles: &(impl Iterator<Item = u32> + Clone), x: &[DVec3]) -> Option<Gap> {
+    /// its reach; nodes are at `x` (m). Gaps of `within_m` and more may be left out.
+    pub(super) fn gap(
+        &self,
+        node: u32,
+        within_m: f64,
+        triangles: &(impl Iterator<Item = u32> + Clone),
+        x: &[DVec3],
+    ) -> Option<Gap> {
         let y = x[node as usize];
+        let mut own = None;
         let mut nearest_sq = self.nodes[node as usize].reach_m().powi(2);
         let mut nearest: Option<Nearest> = None;
         for triangle in triangles.clone() {
@@ -69,16 +81,22 @@ impl SelfContact {
                 continue;
             }
             let normal = twice_area_m2(corners).normalize_or_zero();
-            if self.faces(node, normal, x) {
+            if own.get_or_insert_with(|| self.own_triangles(node, x)).face(normal) {
                 (nearest_sq, nearest) = (distance_sq, Some(Nearest { triangle, weights, way, normal }));
             }
         }
-        let nearest = nearest?;
+        let (nearest, own) = (nearest?, own?);
         if nearest.weights.iter().all(|weight| *weight > 0.0) {
             return Some(nearest.over_face());
         }
-        if self.is_rim(node, &nearest, x) {
-            return self.gap_at_rim(node, &nearest, triangles, x);
+        let rim_m = FADES_WITHIN * self.nodes[node as usize].margin_m;
+        // At a rim, too, `h < within` would be with `δ > D`.
+        let apart_sq = (1.0 + ROUNDING) * (within_m * within_m + rim_m * rim_m);
+        if nearest_sq > apart_sq && self.is_before(&nearest, x) {
+            return None;
+        }
+        if self.is_rim(&own, &nearest, x) {
+            return self.gap_at_rim(node, &own, &nearest, triangles, x);
         }
         let distance_m = nearest.way.length();
         if distance_m < NO_DISTANCE_M {
@@ -102,11 +120,18 @@ impl SelfContact {
         first.into_iter().flat_map(|node| self.around.row(node as usize)).copied().filter(has_all)
     }
 
+    /// Returns whether a vertex is in front of the planes of all triangles that have the edge or corner on which the nearest
+    /// point lies.
+    fn is_before(&self, nearest: &Nearest, x: &[DVec3]) -> bool {
+        self.around_point(nearest)
+            .all(|other| twice_area_m2(self.triangles.corners(other as usize, x)).dot(nearest.way) > 0.0)
+    }
+
     /// Returns whether the nearest point is on a rim: whether a triangle there does not face the vertex.
-    fn is_rim(&self, node: u32, nearest: &Nearest, x: &[DVec3]) -> bool {
+    fn is_rim(&self, own: &OwnTriangles, nearest: &Nearest, x: &[DVec3]) -> bool {
         self.around_point(nearest).any(|other| {
             let normal = twice_area_m2(self.triangles.corners(other as usize, x)).normalize_or_zero();
-            !self.faces(node, normal, x)
+            !own.face(normal)
         })
     }
 
@@ -114,6 +139,7 @@ impl SelfContact {
     fn gap_at_rim(
         &self,
         node: u32,
+        own: &OwnTriangles,
         nearest: &Nearest,
         triangles: &(impl Iterator<Item = u32> + Clone),
         x: &[DVec3],
@@ -124,7 +150,7 @@ impl SelfContact {
             let corners = self.triangles.corners(other as usize, x);
             let normal = twice_area_m2(corners).normalize_or_zero();
             let height_m = (y - corners[0]).dot(normal);
-            if self.faces(node, normal, x) && lowest.is_none_or(|(least_m, ..)| height_m < least_m) {
+            if own.face(normal) && lowest.is_none_or(|(least_m, ..)| height_m < least_m) {
                 lowest = Some((height_m, other, normal));
             }
         }

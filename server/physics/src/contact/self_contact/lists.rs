@@ -6,7 +6,9 @@ use glam::DVec3;
 /// Most pairs that are listed, per vertex of the skin, and at least.
 const PAIRS_PER_VERTEX: usize = 24;
 const AT_LEAST: usize = 4096;
-/// Part of the way until the next query after which it is looked again which pairs may be within reach.
+/// Part of the way until the next query after which it is looked again which pairs may be within reach: after a query, where
+/// the surface may be at rest and stay so, and then.
+const AWAKE_FIRST: f64 = 0.04;
 const AWAKE: f64 = 0.2;
 /// Part of the way until the next query below which a list is made anew rather than looked after.
 const WORTH_KEEPING: f64 = 0.25;
@@ -165,6 +167,6 @@ impl NearWalls {
         }
         self.slack_m = slack_m.min(FOR_EVER_M);
         self.whole_slack_m = self.slack_m;
-        self.awake_m = AWAKE * self.whole_slack_m;
+        self.awake_m = AWAKE_FIRST * self.whole_slack_m;
     }
 }

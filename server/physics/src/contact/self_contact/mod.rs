@@ -21,8 +21,10 @@
 //! *Steps.* With `w = (1, −w_i)` on (vertex, corners), a pair's stiffness is at most `κ φ'' w wᵀ`, and its rows sum to
 //! `2 κ φ''` and `2 w_i κ φ''`. The largest sum over mass that the walls that meet have is added to the body's squared
 //! frequency ([`crate::tick`]'s substeps); no vertex at its margin adds more than [`rest::FREQUENCY_FRACTION`] of it.
+mod bounds;
 mod build;
 mod compact;
+mod facing;
 mod gap;
 mod lists;
 mod press;

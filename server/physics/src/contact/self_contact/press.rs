@@ -162,8 +162,8 @@ impl SelfContact {
         for of_vertex in near.pairs().chunk_by(|one, next| one.node == next.node) {
             let node = of_vertex[0].node;
             let within = of_vertex.iter().filter(|pair| pair.free_m <= moved_m).map(|pair| pair.triangle);
-            let Some(gap) = self.gap(node, &within, x) else { continue };
             let at = &self.nodes[node as usize];
+            let Some(gap) = self.gap(node, at.margin_m, &within, x) else { continue };
             if gap.distance_m < at.margin_m {
                 let bears = self.triangles.nodes[gap.triangle as usize].map(|n| self.nodes[n as usize].bears);
                 visit(node, &Pressed::of(gap, at, bears));

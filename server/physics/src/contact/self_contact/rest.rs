@@ -111,6 +111,8 @@ pub(super) struct ClusterAtRest {
     /// Least distance (m) to what it may meet, of close clusters and of all others.
     pub(super) free_close_m: f64,
     pub(super) free_far_m: f64,
+    /// Three of its vertices that tell how it turns: two that are far apart, and one far from the line through them.
+    pub(super) turns_with: [u32; 3],
 }
 
 /// A cluster that is close to another at rest.
@@ -189,14 +191,6 @@ impl SelfContact {
     fn is_adjacent(&self, node: u32, corners: [u32; 3]) -> bool {
         let around = self.around.row(node as usize).iter();
         around.flat_map(|&triangle| self.triangles.nodes[triangle as usize]).any(|n| corners.contains(&n))
-    }
-
-    /// Returns whether the skin at a vertex faces a triangle with this normal: whether any triangle around it does.
-    pub(super) fn faces(&self, node: u32, normal: DVec3, x: &[DVec3]) -> bool {
-        self.around.row(node as usize).iter().any(|&triangle| {
-            let own = twice_area_m2(self.triangles.corners(triangle as usize, x));
-            -own.dot(normal) > FACING * own.length()
-        })
     }
 
     /// Returns the number of vertices that are left out because the body lies against itself there at rest.

@@ -5,7 +5,7 @@ use crate::{
     mesh::{Surface, TetMesh},
     testing::{Random, tet_box},
 };
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 const GAP_M: f64 = 4e-3;
 
@@ -188,6 +188,79 @@ fn queries_lose_nothing_that_is_within_reach() {
     assert!(met > 100, "{met}");
 }
 
+/// A body that turns as a whole has displacements of its own size; arms that also bend meet as they do where it does not turn.
+#[test]
+fn queries_lose_nothing_of_a_body_that_turned() {
+    let mesh = clamp();
+    let turned = |seed: u64| {
+        let axis = DVec3::new(1.0, 0.1 * seed as f64, -0.5).normalize();
+        let turn = DQuat::from_axis_angle(axis, 0.25 * seed as f64);
+        bent(&mesh, 1e-4 * (20 + seed) as f64, 2e-4, seed + 1).iter().map(|p| turn * *p).collect()
+    };
+    let met = met_in(&mesh, (0..20).map(turned));
+    assert!(met > 100, "{met}");
+}
+
+/// Most pairs of clusters of a body that turned and is little strained are ruled out by how it is displaced beside that, and
+/// every one of them is as far apart as that says.
+#[test]
+fn bounds_of_what_turned_hold_and_rule_out() {
+    let mesh = clamp_of([20, 6, 10]);
+    let walls = walls_of(&mesh, true).unwrap();
+    let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 1.0);
+    let x: Vec<DVec3> = bent(&mesh, 5e-4, 1e-5, 3).iter().map(|p| turn * *p).collect();
+    let (mut by_turning, mut pairs) = (0, 0);
+    for one in 0..walls.clusters.len() {
+        let frame = walls.frame(one, &x);
+        let of_one = walls.displaced_in(one, &frame, &x);
+        for entry in walls.close.row(one).iter().filter(|entry| entry.free_m.is_finite()) {
+            let other = entry.cluster as usize;
+            let bound_m = entry.free_m - of_one.differs_m(&walls.displaced_in(other, &frame, &x));
+            let as_displaced = [one, other].map(|cluster| walls.cluster_now(cluster, &x).displaced);
+            let without_m = entry.free_m - as_displaced[0].differs_m(&as_displaced[1]);
+            pairs += 1;
+            by_turning += u32::from(bound_m > 0.5 * entry.free_m && without_m <= 0.5 * entry.free_m);
+            for &node in walls.of_cluster.row(one) {
+                let may = |triangle: &usize| walls.may_meet_m(node, *triangle).is_some();
+                let distance_m = |triangle| walls.distance_m(x[node as usize], triangle, &x);
+                let least_m =
+                    walls.triangles.cluster_range(other).filter(may).map(distance_m).fold(f64::INFINITY, f64::min);
+                assert!(least_m >= bound_m - 1e-12, "clusters {one} and {other}: {least_m} {bound_m}");
+            }
+        }
+    }
+    println!("{by_turning} of {pairs} pairs");
+    assert!(2 * by_turning > pairs && pairs > 50, "{by_turning} of {pairs}");
+}
+
+/// Gaps that do not matter are left out early, and no others: with walls apart, at each other and through each other.
+#[test]
+fn only_gaps_that_do_not_matter_are_left_out() {
+    let mesh = clamp();
+    let walls = walls_of(&mesh, true).unwrap();
+    let (mut kept, mut left_out, mut behind) = (0, 0, 0);
+    for seed in 0..80 {
+        let x = bent(&mesh, 5e-5 * seed as f64, 4e-4, seed + 1);
+        for of_vertex in walls.near_at(&x).pairs().chunk_by(|one, next| one.node == next.node) {
+            let (node, triangles) = (of_vertex[0].node, of_vertex.iter().map(|pair| pair.triangle));
+            let margin_m = walls.nodes[node as usize].margin_m;
+            let any = walls.gap(node, f64::INFINITY, &triangles, &x);
+            let within = walls.gap(node, margin_m, &triangles, &x);
+            assert!(within.is_none() || within == any, "node {node}");
+            assert_eq!(
+                within.filter(|gap| gap.distance_m < margin_m),
+                any.filter(|gap| gap.distance_m < margin_m),
+                "node {node}"
+            );
+            kept += u32::from(within.is_some());
+            left_out += u32::from(within.is_none() && any.is_some());
+            behind += u32::from(any.is_some_and(|gap| gap.distance_m < -margin_m));
+        }
+    }
+    println!("{kept} kept, {left_out} left out, {behind} far behind a wall");
+    assert!(kept > 100 && left_out > 100 && behind > 20, "{kept} {left_out} {behind}");
+}
+
 /// A list that has served for some way presses to the last bit what one that is made anew does, from before walls meet until they overlap.
 #[test]
 fn what_does_not_matter_yet_is_not_pressed_either() {
@@ -252,7 +325,8 @@ fn met_in(mesh: &TetMesh, states: impl Iterator<Item = Vec<DVec3>>) -> u32 {
         for node in surface_nodes {
             let all = (0..walls.triangles.len() as u32).filter(|&t| walls.may_meet_m(node, t as usize).is_some());
             let listed = found.pairs().iter().filter(|pair| pair.node == node).map(|pair| pair.triangle);
-            let (by_all, by_list) = (walls.gap(node, &all, &x), walls.gap(node, &listed, &x));
+            let (by_all, by_list) =
+                (walls.gap(node, f64::INFINITY, &all, &x), walls.gap(node, f64::INFINITY, &listed, &x));
             assert_eq!(by_all, by_list, "node {node}");
             met += u32::from(by_all.is_some_and(|gap| gap.distance_m < walls.nodes[node as usize].margin_m));
         }
