@@ -55,8 +55,8 @@ pub(crate) struct Steps {
     pub(crate) substeps_per_long_step: u32,
     /// Number of substeps that would be enough, before it was rounded up; no more than `substeps`.
     pub(crate) enough: f64,
-    /// Part of the square of the largest frequency that is contact's, from 0 to 1.
-    pub(crate) of_contact: f64,
+    /// Part of the square of the largest frequency that grows as a tool's foundation does, from 0 to 1.
+    pub(crate) grows_with_contact: f64,
     /// Square (rad²/s²) of the largest frequency that they are enough for.
     pub(crate) frequency_sq: f64,
     /// How many times as many there are as without viscosity; 1 where their number is fixed.
@@ -86,7 +86,7 @@ impl Steps {
             substeps,
             substeps_per_long_step: 1,
             enough: wanted.min(f64::from(substeps)),
-            of_contact: (1.0 - (alone / omega).powi(2)).clamp(0.0, 1.0),
+            grows_with_contact: 0.5 * (1.0 - (alone / omega).powi(2)).clamp(0.0, 1.0),
             frequency_sq: omega * omega,
             for_viscosity,
         };
@@ -109,12 +109,13 @@ impl Steps {
         }
     }
 
-    /// Returns the number of substeps that contact needs, `n √(1 + ½ (φ − 1) c + a/ω²)`: with a foundation φ times as
-    /// stiff as at rest, the part c of the squared frequency `ω²` that is contact's, and what walls that meet add to it, a.
+    /// Returns the number of substeps that contact needs, `n √(1 + (φ − 1) g + a/ω²)`: with a foundation φ times as
+    /// stiff as at rest, the part g of the squared frequency `ω²` that grows as it does, and what walls that meet add, a.
     ///
-    /// The half: c comes from the sums of the rows of contact's stiffness. In the modes of the largest frequency,
-    /// neighbours move against each other and the samples between them hardly, so that contact adds a quarter of these
-    /// sums or less there (`docs/measurements/deep-press.md`).
+    /// That part is half of what is contact's, which comes from the sums of the rows of contact's stiffness. In the modes of
+    /// the largest frequency, neighbours move against each other and the samples between them hardly, so that contact adds
+    /// a quarter of these sums or less there (`docs/measurements/deep-press.md`). Of a body with particles it is all
+    /// ([`Self::with_fine_level`]).
     pub(crate) fn with_stiffer_contact(self, stiffer: StifferContact) -> u32 {
         let needed = self.needed_by_contact(stiffer) / WITHIN_SAFETY;
         (needed.ceil() as u32).max(self.substeps).next_multiple_of(self.substeps_per_long_step)
@@ -123,7 +124,15 @@ impl Steps {
     /// Returns the same before it is rounded up.
     pub(crate) fn needed_by_contact(self, StifferContact { times, walls_sq }: StifferContact) -> f64 {
         let of_walls = if walls_sq > 0.0 { walls_sq / self.frequency_sq.max(f64::MIN_POSITIVE) } else { 0.0 };
-        self.enough * (1.0 + 0.5 * (times - 1.0).max(0.0) * self.of_contact + of_walls).sqrt()
+        self.enough * (1.0 + (times - 1.0).max(0.0) * self.grows_with_contact + of_walls).sqrt()
+    }
+
+    /// Returns the same substeps for a body whose largest frequency is that of particles beside the contact. A foundation
+    /// stiffens where the skin is stretched, and the cells below are stretched alike, far beyond
+    /// [`Settings::stretch_allowance`] where a tool is deep: they stiffen as much (`docs/adr/deep-press.md`).
+    #[must_use]
+    pub(crate) fn with_fine_level(self) -> Self {
+        Self { grows_with_contact: 1.0, ..self }
     }
 
     /// Returns the same substeps for a body whose coarse level may take longer steps; `omega` (rad/s) is the largest

@@ -80,7 +80,7 @@ impl HybridBody {
         let steps = Steps::choose(&around.settings, Frequencies { alone, touched: omega_sq.sqrt(), damping_per_s })?;
         let coarse_omega = stretch_sq.sqrt() * hybrid.coarse_frequency_rad_per_s();
         let coarse_damping_per_s = damping_growth(&around.settings) * hybrid.coarse_damping_per_s();
-        let steps = steps.with_long_steps(&around.settings, coarse_omega, coarse_damping_per_s);
+        let steps = steps.with_fine_level().with_long_steps(&around.settings, coarse_omega, coarse_damping_per_s);
         Ok((hybrid, Environment::new(around, surface, contact, steps)))
     }
 }

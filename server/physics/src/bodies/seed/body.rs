@@ -106,7 +106,7 @@ impl SeedBody {
             substeps,
             substeps_per_long_step: 1,
             enough,
-            of_contact: 0.0,
+            grows_with_contact: 0.0,
             frequency_sq: 0.0,
             for_viscosity: 1.0,
         };
