@@ -193,7 +193,7 @@ fn what_asks_for_too_many_substeps_is_named() {
                 mass_kg = 1e-12\ndriver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 20] }]\n";
     for (scene, by, advice) in [
         (scene.replace("10e3", "10e15"), "the body needs", "soften the material"),
-        (scene.replace("psi_pa_s = 0.3", "psi_pa_s = 3e6"), "the viscosity of the body needs", "lower the viscosity"),
+        (scene.replace("psi_pa_s = 0.3", "psi_pa_s = 3e8"), "the viscosity of the body needs", "lower the viscosity"),
         (scene + tool, "a tool on its spring needs", "more mass_kg"),
     ] {
         let ended = run("check", &scene, &[]);

@@ -321,7 +321,7 @@ fn backward_euler_bears_stiff_viscous_contact_at_one_step_a_tick() {
     let mut spec = held_block(Integrator::BackwardEuler);
     solid_mut(&mut spec).regions[0].material = material(Law::StableNeoHookean, 1e6, 0.45);
     solid_mut(&mut spec).regions[0].material.viscosity =
-        palpate_physics::material::Viscosity { phi_pa_s: 500.0, psi_pa_s: 500.0 };
+        palpate_physics::material::Viscosity { phi_pa_s: 2000.0, psi_pa_s: 2000.0 };
     spec.tools = vec![sphere(0.008, DVec3::new(0.0, 0.0, 0.0085), Coupling::Rigid)];
     spec.tools[0].friction_coefficient = 0.5;
     let explicit = {
