@@ -190,7 +190,7 @@ fn check_tells_what_it_knows_of_a_body_that_is_refused() {
 fn what_asks_for_too_many_substeps_is_named() {
     let scene = pressed("stable-neo-hookean", 0.1);
     let tool = "[[tool]]\nname = \"tip\"\nradius_mm = 6\ncoupling = \"spring\"\nstiffness_n_per_m = 5000\ndamping_n_s_per_m = 1\n\
-                mass_kg = 1e-12\ndriver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 20] }]\n";
+                mass_kg = 1e-14\ndriver = \"script\"\nkeyframe = [{ time_s = 0, position_mm = [0, 0, 20] }]\n";
     for (scene, by, advice) in [
         (scene.replace("10e3", "10e15"), "the body needs", "soften the material"),
         (scene.replace("psi_pa_s = 0.3", "psi_pa_s = 3e8"), "the viscosity of the body needs", "lower the viscosity"),
