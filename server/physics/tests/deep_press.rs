@@ -8,8 +8,7 @@ use rig::{Rig, held_below, hybrid_block, solid_mut, sphere};
 const RADIUS_M: f64 = 0.01;
 const DEPTH_M: f64 = 0.02;
 
-/// Half of a block's thickness is pressed in. Substeps that were enough for the body at rest turned cells inside out, and a
-/// fifth of the energy was lost, where no viscosity asked for more.
+/// Half of a block's thickness is pressed in.
 #[test]
 fn a_deep_press_turns_nothing_inside_out_and_loses_no_energy() {
     let waking = Waking::in_half_ball(2.5e-3, None, 600);
