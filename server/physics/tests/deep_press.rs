@@ -3,17 +3,23 @@
 mod rig;
 use glam::DVec3;
 use palpate_physics::{Energies, Settings, bodies::hybrid::Waking, contact::Coupling, material::Viscosity, world};
-use rig::{Rig, held_below, hybrid_block, solid_mut, sphere};
+use rig::{Rig, bricks, even, held_below, hybrid_block, solid_mut, sphere};
 
 const RADIUS_M: f64 = 0.01;
 const DEPTH_M: f64 = 0.02;
 
-/// Half of a block's thickness is pressed in.
+/// Half of a block's thickness is pressed in. With the substeps that contact alone asks for, cells turned inside out, and where
+/// no viscosity asked for more the ledger missed 6.4e-3 J.
 #[test]
 fn a_deep_press_turns_nothing_inside_out_and_loses_no_energy() {
     let waking = Waking::in_half_ball(2.5e-3, None, 600);
     for psi_pa_s in [0.0, 0.3] {
-        let mut spec = held_below(hybrid_block((0.04, 2, 16), 0.45, 600, waking));
+        let mut spec = hybrid_block((0.04, 2, 16), 0.45, 600, waking);
+        let side = even(-0.04, 0.04, 4);
+        let coarse = solid_mut(&mut spec);
+        coarse.mesh = bricks(&side, &side, &even(-0.04, 0.0, 4));
+        coarse.tet_region = vec![0; coarse.mesh.tets().len()];
+        let mut spec = held_below(spec);
         spec.settings = Settings { mass_damping_per_s: 20.0, ..Settings::for_particles() };
         solid_mut(&mut spec).regions[0].material.viscosity = Viscosity::new(0.0, psi_pa_s).unwrap();
         spec.tools = vec![sphere(RADIUS_M, DVec3::Z * (RADIUS_M + 5e-3), Coupling::Rigid)];
