@@ -45,6 +45,8 @@ enum Command {
     Ripple,
     /// What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it
     Hearts(hearts::Options),
+    /// Makes the two surfaces of the heart that is shipped (deploy/scenes/heart.toml)
+    HeartSurfaces(hearts::ShippedOptions),
     /// Whether every bit of every scene is as it was (tests/lab/records/hashes.txt); exit code 1 if not
     Hashes(hashes::Options),
 }
@@ -63,6 +65,7 @@ fn main() -> miette::Result<()> {
         Command::Deep(options) => deep::print(&options),
         Command::Ripple => ripple::print(),
         Command::Hearts(options) => hearts::print(&options),
+        Command::HeartSurfaces(options) => hearts::write_shipped(&options),
         Command::Hashes(options) => hashes::run(&options),
     }
 }

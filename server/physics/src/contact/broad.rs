@@ -103,9 +103,8 @@ pub(crate) trait Skin {
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
 
-    /// Writes the positions (m) of all vertices. The buffer is for the displacements (m) of what carries them
-    /// ([`super::MostCarriers`]).
-    fn place(&self, x: &mut [DVec3], _: &mut [DVec3]) {
+    /// Writes the positions (m) of all vertices.
+    fn place(&self, x: &mut [DVec3]) {
         (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
     }
 

@@ -8,8 +8,6 @@ pub(crate) struct MostCarriers {
     pub(crate) nodes: usize,
     /// Most particles that are active at once.
     pub(crate) active: usize,
-    /// Particles that carry any vertex.
-    pub(crate) of_skin: usize,
 }
 
 /// Displacements (m) of a skin's carriers at some instant. Its clones keep the capacity.

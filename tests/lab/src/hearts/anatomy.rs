@@ -4,7 +4,7 @@
 //! `a`, both start as `(|q| − 1) min a`, about the distance (m) from an ellipsoid, negative within it.
 use crate::random::Random;
 use glam::DVec3;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Most papillary muscles.
 const MOST_MUSCLES: usize = 3;
@@ -43,6 +43,29 @@ struct Muscle {
 }
 
 impl Anatomy {
+    /// A left ventricle of mean human size: 84 mm long, 62 mm wide, its wall 9.5 mm thick, two papillary muscles; its septum is at
+    /// negative `x`, so that what is at positive `x` is free wall.
+    pub(super) fn mean() -> Self {
+        let mut heart = Self {
+            semi_axes_m: DVec3::new(31e-3, 30e-3, 66e-3),
+            centre_z_m: -18e-3,
+            wall_m: 9.5e-3,
+            apex_m: 6e-3,
+            septum: -DVec3::X,
+            flattened_m: 4.5e-3,
+            uneven: 0.08,
+            thick_side_rad: PI,
+            muscles: Vec::new(),
+            saddle_m: 2e-3,
+            saddle_rad: 0.0,
+        };
+        // Antero-lateral and postero-medial.
+        for side_rad in [0.3 * PI, -0.35 * PI] {
+            heart.muscles.push(heart.muscle(side_rad, [0.55, 0.3], 1.5e-3, 3.5e-3));
+        }
+        heart
+    }
+
     pub(super) fn random(random: &mut Random) -> Self {
         let radius_m = random.within(26e-3, 32e-3);
         let semi_axes_m = DVec3::new(radius_m, radius_m * random.within(0.85, 1.1), random.within(52e-3, 66e-3));
@@ -70,19 +93,29 @@ impl Anatomy {
     }
 
     fn random_muscle(&self, random: &mut Random) -> Muscle {
-        let angle = random.within(0.0, TAU);
-        let side = DVec3::new(angle.cos(), angle.sin(), 0.0);
+        let side_rad = random.within(0.0, TAU);
+        let low = random.within(0.45, 0.6);
+        let high = low - random.within(0.2, 0.35);
+        let stands_out_m = random.within(1e-3, 3e-3);
+        self.muscle(side_rad, [low, high], stands_out_m, random.within(2.5e-3, 4e-3))
+    }
+
+    /// A muscle on one side of the cavity between two heights (parts of the cavity's, from the centre towards the apex); its upper end
+    /// stands out into the cavity.
+    fn muscle(&self, side_rad: f64, [low, high]: [f64; 2], stands_out_m: f64, radius_m: f64) -> Muscle {
+        let side = DVec3::new(side_rad.cos(), side_rad.sin(), 0.0);
         let cavity_m = self.semi_axes_m - DVec3::new(self.wall_m, self.wall_m, self.apex_m);
         let at = |height: f64| {
             let z = self.centre_z_m - height * cavity_m.z;
             let wide = (1.0 - height * height).max(0.0).sqrt();
             side * (DVec3::new(cavity_m.x, cavity_m.y, 0.0) * wide) + DVec3::Z * z
         };
-        let low = random.within(0.45, 0.6);
-        let high = low - random.within(0.2, 0.35);
-        // The upper end stands out into the cavity.
-        let to_m = at(high) - side * random.within(1e-3, 3e-3);
-        Muscle { from_m: at(low), to_m, radius_m: random.within(2.5e-3, 4e-3) }
+        Muscle { from_m: at(low), to_m: at(high) - side * stands_out_m, radius_m }
+    }
+
+    /// The ellipsoids' centre (m), and a distance (m) from it that nothing is beyond.
+    pub(super) fn centre_and_reach_m(&self) -> (DVec3, f64) {
+        (DVec3::Z * self.centre_z_m, 1.5 * self.semi_axes_m.max_element())
     }
 
     /// Returns a box (m) that holds the surfaces below the base.

@@ -6,7 +6,9 @@
 mod anatomy;
 mod isosurface;
 mod scene;
+mod shipped;
 mod ticks;
 
 pub(crate) use scene::Heart;
+pub use shipped::{ShippedOptions, write as write_shipped};
 pub use ticks::{Options, print};

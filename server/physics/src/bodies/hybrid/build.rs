@@ -57,11 +57,7 @@ impl HybridBody {
             } else {
                 SkinFollows::StiffElements
             },
-            carriers: MostCarriers {
-                nodes: hybrid.node_count(),
-                active: hybrid.particles().most_active,
-                of_skin: hybrid.skin_carriers.particles().len(),
-            },
+            carriers: MostCarriers { nodes: hybrid.node_count(), active: hybrid.particles().most_active },
         };
         let contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());

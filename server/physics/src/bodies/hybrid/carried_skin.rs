@@ -6,30 +6,22 @@ use crate::{
 };
 use glam::DVec3;
 
-/// A vertex of the skin: its rest position, and the particles that carry it.
+/// A vertex of the skin: its rest position, and the active particles that carry it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Carried {
     rest_m: DVec3,
     vertex: u32,
-    carriers: [(Carrier, f64); 8],
-    /// How many of the carriers have a weight other than zero; they are the first ones. None where there are more than eight, as
-    /// of a smooth skin: those are looked up.
-    weighty: usize,
+    /// Numbers of active particles, with their weights.
+    active: [(u32, f64); 8],
+    /// How many of them there are; more than the list holds are looked up.
+    active_count: usize,
 }
 
 impl Carried {
-    fn carriers(&self) -> &[(Carrier, f64)] {
-        &self.carriers[..self.weighty]
+    /// The active particles, where the list holds all of them.
+    fn active(&self) -> Option<&[(u32, f64)]> {
+        self.active.get(..self.active_count)
     }
-}
-
-/// What moves a particle that carries a vertex.
-#[derive(Debug, Clone, Copy)]
-enum Carrier {
-    /// A point of the patch, given by its number.
-    Point(u32),
-    /// The coarse nodes alone.
-    Nodes(Anchor),
 }
 
 /// The skin at one instant, as contact queries it.
@@ -52,12 +44,18 @@ impl<'a> SkinView<'a> {
         Self { v, ..self }
     }
 
-    /// Returns the displacement (m) of a particle.
-    fn displacement_m(&self, particle: u32, anchor: &Anchor) -> DVec3 {
-        match self.patch.point_of(particle) {
-            NONE => anchor.of(self.patch.node_displacements_m()),
-            point => self.patch.displacements_m()[point as usize],
-        }
+    /// Returns the active particles that carry a vertex, each by its number, with their weights.
+    fn active_carriers(&self, vertex: u32) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let is_carried = self.hybrid.clusters.of_vertex(vertex).is_none_or(|at| self.patch.carries_of_cluster(at));
+        let carriers = if is_carried { self.hybrid.skin_carriers.of_vertex(vertex) } else { &[] };
+        let numbered = carriers.iter().map(|&(particle, weight)| (self.patch.number_of(particle), weight));
+        numbered.filter(|(number, _)| *number != NONE)
+    }
+
+    /// Returns `Σ_i ω_i u_i + Σ_p w_p d_p` (m) of a vertex ([`super::skin_carriers`]), with its active particles.
+    fn moved_by_m(&self, vertex: u32, active: impl Iterator<Item = (u32, f64)>) -> DVec3 {
+        let asleep_m = self.hybrid.skin_carriers.of_nodes(vertex, self.patch.node_displacements_m());
+        active.fold(asleep_m, |moved_m, (number, weight)| moved_m + self.patch.deviation_of_m(number) * weight)
     }
 
     /// Returns the position (m) of a vertex when its carriers were noted.
@@ -114,21 +112,7 @@ impl Skin for SkinView<'_> {
     }
 
     fn position_m(&self, vertex: u32) -> DVec3 {
-        let carriers = &self.hybrid.skin_carriers;
-        let of = |particle: u32| self.displacement_m(particle, carriers.anchor(particle));
-        let moved: DVec3 = carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum();
-        self.hybrid.skin_rest_m()[vertex as usize] + moved
-    }
-
-    /// A particle carries many vertices: each is displaced once.
-    fn place(&self, x: &mut [DVec3], of_carriers_m: &mut [DVec3]) {
-        let carriers = &self.hybrid.skin_carriers;
-        for (slot, (particle, anchor)) in of_carriers_m.iter_mut().zip(carriers.particles()) {
-            *slot = self.displacement_m(particle, anchor);
-        }
-        for ((vertex, x_m), rest_m) in (0..).zip(x).zip(self.hybrid.skin_rest_m()) {
-            *x_m = *rest_m + carriers.moved_m(vertex, of_carriers_m);
-        }
+        self.hybrid.skin_rest_m()[vertex as usize] + self.moved_by_m(vertex, self.active_carriers(vertex))
     }
 
     fn remember(&self, then: &mut CarriersThen) {
@@ -169,60 +153,51 @@ impl CarriedSkin for SkinView<'_> {
     }
 
     fn carriers(&self, vertex: u32) -> Carried {
-        let hybrid = self.hybrid;
-        let (rest_m, of_vertex) = (hybrid.skin_rest_m()[vertex as usize], hybrid.skin_carriers.of_vertex(vertex));
-        let mut carriers = [(Carrier::Point(NONE), 0.0); 8];
-        if of_vertex.len() > carriers.len() {
-            return Carried { rest_m, vertex, carriers, weighty: 0 };
+        let mut carried = Carried {
+            rest_m: self.hybrid.skin_rest_m()[vertex as usize],
+            vertex,
+            active: [(0, 0.0); 8],
+            active_count: 0,
+        };
+        for carrier in self.active_carriers(vertex) {
+            if let Some(slot) = carried.active.get_mut(carried.active_count) {
+                *slot = carrier;
+            }
+            carried.active_count += 1;
         }
-        for (&(particle, weight), slot) in of_vertex.iter().zip(&mut carriers) {
-            let carrier = match self.patch.point_of(particle) {
-                NONE => Carrier::Nodes(*hybrid.skin_carriers.anchor(particle)),
-                point => Carrier::Point(point),
-            };
-            *slot = (carrier, weight);
-        }
-        Carried { rest_m, vertex, carriers, weighty: of_vertex.len() }
+        carried
     }
 
     fn carried_m(&self, carried: &Carried) -> DVec3 {
-        if carried.weighty == 0 {
-            return self.position_m(carried.vertex);
+        match carried.active() {
+            Some(active) => carried.rest_m + self.moved_by_m(carried.vertex, active.iter().copied()),
+            None => carried.rest_m + self.moved_by_m(carried.vertex, self.active_carriers(carried.vertex)),
         }
-        let of = |carrier: &Carrier| match carrier {
-            Carrier::Point(point) => self.patch.displacements_m()[*point as usize],
-            Carrier::Nodes(anchor) => anchor.of(self.patch.node_displacements_m()),
-        };
-        let moved: DVec3 = carried.carriers().iter().map(|(carrier, weight)| of(carrier) * *weight).sum();
-        carried.rest_m + moved
     }
 
     fn velocity_m_per_s(&self, vertex: u32) -> DVec3 {
-        let hybrid = self.hybrid;
-        let of = |particle: u32| match self.patch.number_of(particle) {
-            NONE => hybrid.skin_carriers.anchor(particle).of(self.v),
-            number => self.v[hybrid.node_count() + number as usize],
-        };
-        hybrid.skin_carriers.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum()
+        let (carriers, nodes) = (&self.hybrid.skin_carriers, self.hybrid.node_count());
+        let mut v_m_per_s = carriers.of_nodes(vertex, self.v);
+        for (number, weight) in self.active_carriers(vertex) {
+            let asleep = carriers.anchor(self.patch.active()[number as usize]).of(self.v);
+            v_m_per_s += (self.v[nodes + number as usize] - asleep) * weight;
+        }
+        v_m_per_s
     }
 
+    /// The transpose of the positions' weights.
     fn push(&self, carried: &Carried, force_n: DVec3, forces_n: &mut [DVec3]) {
-        if carried.weighty == 0 {
-            let carriers = &self.hybrid.skin_carriers;
-            for &(particle, weight) in carriers.of_vertex(carried.vertex) {
-                match self.patch.point_of(particle) {
-                    NONE => carriers.anchor(particle).push(force_n * weight, forces_n),
-                    point => self.patch.push(point, force_n * weight, self.hybrid.node_count(), forces_n),
-                }
+        let carriers = &self.hybrid.skin_carriers;
+        if carried.active_count == 0 {
+            for &(node, weight) in carriers.nodes_of_vertex(carried.vertex) {
+                forces_n[node as usize] += force_n * weight;
             }
             return;
         }
-        for (carrier, weight) in carried.carriers() {
-            match carrier {
-                Carrier::Nodes(anchor) => anchor.push(force_n * *weight, forces_n),
-                Carrier::Point(point) => {
-                    self.patch.push(*point, force_n * *weight, self.hybrid.node_count(), forces_n);
-                }
+        for &(particle, weight) in carriers.of_vertex(carried.vertex) {
+            match self.patch.number_of(particle) {
+                NONE => carriers.anchor(particle).push(force_n * weight, forces_n),
+                number => forces_n[self.hybrid.node_count() + number as usize] += force_n * weight,
             }
         }
     }
@@ -312,6 +287,7 @@ mod tests {
     use crate::{
         bodies::hybrid::{
             prestrain::PrestrainDecay,
+            skin_carriers::SkinCarriers,
             testing::{Random, hybrid_ball, tissue},
         },
         contact::MostCarriers,
@@ -329,25 +305,62 @@ mod tests {
         patch
     }
 
-    #[test]
-    fn vertices_are_placed_alike_and_never_move_farther_than_their_carriers_tell() {
-        let [material, other, _] = tissue();
-        let body = hybrid_ball(&[material, other]);
+    /// Sets of particles to be awake: none, one side, the other side, all.
+    fn sets(body: &HybridBody) -> [Vec<u32>; 4] {
         let all: Vec<u32> = (0..body.partition.particle_count() as u32).filter(|&p| body.may_wake(p)).collect();
         let some = |of: fn(DVec3) -> bool| -> Vec<u32> {
             all.iter().copied().filter(|&particle| of(body.partition.particle_m(particle))).collect()
         };
-        let sets = [vec![], some(|p| p.x > 2e-3), some(|p| p.y > -2e-3), all.clone()];
-        let most =
-            MostCarriers { nodes: body.node_count(), active: all.len(), of_skin: body.skin_carriers.particles().len() };
-        let mut random = Random(17);
-        let mut of_carriers_m = vec![DVec3::ZERO; most.of_skin];
-        let mut place = |patch: &RunningPatch| {
-            let mut x = vec![DVec3::NAN; body.skin_rest_m().len()];
-            SkinView::new(&body, patch).place(&mut x, &mut of_carriers_m);
-            for (vertex, x) in (0..).zip(&x) {
-                assert_eq!(*x, SkinView::new(&body, patch).position_m(vertex));
+        [vec![], some(|p| p.x > 2e-3), some(|p| p.y > -2e-3), all.clone()]
+    }
+
+    /// Positions and velocities are those of the plain sum over particles, whether clusters tell that nothing active carries a vertex or
+    /// not, and forces go where work needs them to: `Σ f_i·v_i = f·v`.
+    #[test]
+    fn vertices_are_where_their_particles_are_and_push_them_as_they_are_moved() {
+        let [material, other, _] = tissue();
+        let mut body = hybrid_ball(&[material, other]);
+        let triangles = body.particles.skin.triangles().to_vec();
+        let mut random = Random(5);
+        for (clustered, smooth) in [(false, false), (true, false), (false, true), (true, true)] {
+            body.skin_carriers = SkinCarriers::new(&body.partition, &body.vertex_points, smooth);
+            body.cluster(if clustered { &triangles } else { &[] });
+            for active in sets(&body) {
+                let patch = displaced(&body, &active, 1e-3, &mut random);
+                let rest = body.partition.coarse().positions_m().iter().copied();
+                let rest = rest.chain(active.iter().map(|&particle| body.partition.particle_m(particle)));
+                let u = patch.node_displacements_m().iter().copied();
+                let u = u.chain(patch.active_displacements_m().map(|(_, _, u)| u));
+                let x: Vec<DVec3> = rest.clone().zip(u).map(|(rest, u)| rest + u).collect();
+                let v: Vec<DVec3> = x.iter().map(|_| random.vector()).collect();
+                let there: Vec<DVec3> = rest.zip(&v).map(|(rest, v)| rest + *v).collect();
+                let view = SkinView::new(&body, &patch).moving(&v);
+                for vertex in 0..body.skin_rest_m().len() as u32 {
+                    let [expected_m, moved_m] = [&x, &there].map(|x| body.vertex_m(vertex, &active, x));
+                    assert!(view.position_m(vertex).distance(expected_m) < 1e-15, "{vertex}");
+                    let carried = view.carriers(vertex);
+                    assert_eq!(view.carried_m(&carried), view.position_m(vertex));
+                    let (velocity, rest_m) = (view.velocity_m_per_s(vertex), body.skin_rest_m()[vertex as usize]);
+                    assert!(velocity.distance(moved_m - rest_m) < 1e-12, "{velocity} {}", moved_m - rest_m);
+                    let (force_n, mut forces_n) = (random.vector(), vec![DVec3::ZERO; v.len()]);
+                    view.push(&carried, force_n, &mut forces_n);
+                    let power_w: f64 = forces_n.iter().zip(&v).map(|(f, v)| f.dot(*v)).sum();
+                    assert!((power_w - force_n.dot(velocity)).abs() < 1e-12, "{power_w}");
+                }
             }
+        }
+    }
+
+    #[test]
+    fn vertices_never_move_farther_than_their_carriers_tell() {
+        let [material, other, _] = tissue();
+        let body = hybrid_ball(&[material, other]);
+        let sets = sets(&body);
+        let most = MostCarriers { nodes: body.node_count(), active: sets[3].len() };
+        let mut random = Random(17);
+        let place = |patch: &RunningPatch| {
+            let mut x = vec![DVec3::NAN; body.skin_rest_m().len()];
+            SkinView::new(&body, patch).place(&mut x);
             x
         };
         for (before, after) in sets.iter().flat_map(|before| sets.iter().map(move |after| (before, after))) {

@@ -8,7 +8,7 @@
 //! x − X ∈ ū ± (a ½(u_max − u_min) + a max |d_p|),   ū = ½(u_min + u_max)
 //! ```
 //! The last term is left out where no active particle carries a vertex.
-use super::{body::HybridBody, skin_influence::amplification};
+use super::{body::HybridBody, partition::NONE, skin_influence::amplification};
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -20,6 +20,8 @@ pub struct SkinClusters {
     groups: Boxes,
     /// Particles with the clusters whose vertices they carry, ascending.
     carried: Vec<[u32; 2]>,
+    /// One of the clusters that each vertex belongs to.
+    of_vertex: Vec<u32>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -48,15 +50,17 @@ impl SkinClusters {
         };
         let (clusters, groups) = (boxes(CLUSTER), boxes(GROUP));
         let mut carried: Vec<[u32; 2]> = Vec::new();
+        let mut of_vertex = vec![NONE; rest_positions_m.len()];
         for (cluster, ends) in (0..).zip(clusters.first_vertex.windows(2)) {
             let mut of_cluster = BTreeSet::new();
             for &vertex in &clusters.vertices[ends[0] as usize..ends[1] as usize] {
+                of_vertex[vertex as usize] = cluster;
                 of_cluster.extend(hybrid.carriers_of_vertex(vertex).iter().map(|(particle, _)| [*particle, cluster]));
             }
             carried.extend(of_cluster);
         }
         carried.sort_unstable();
-        Self { clusters, groups, carried }
+        Self { clusters, groups, carried, of_vertex }
     }
 
     /// Returns the number of clusters.
@@ -71,6 +75,11 @@ impl SkinClusters {
             .iter()
             .take_while(move |carried| carried[0] == particle)
             .map(|carried| carried[1] as usize)
+    }
+
+    /// Returns one of the clusters that a vertex belongs to; `None` for one of no triangle.
+    pub(super) fn of_vertex(&self, vertex: u32) -> Option<usize> {
+        self.of_vertex.get(vertex as usize).filter(|cluster| **cluster != NONE).map(|cluster| *cluster as usize)
     }
 
     /// Returns the number of groups.

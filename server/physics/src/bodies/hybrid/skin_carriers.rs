@@ -10,6 +10,12 @@
 //! with the trilinear weights `t_p`; on a whole lattice `w_p` is the quadratic B-spline. As the cube is symmetric about the vertex and
 //! trilinear points move affinely, so does the mean, whatever cells the cube meets: where it reaches out of the body, the nearest cell's
 //! weights are continued. Across a flat face that lies on the lattice the mean changes nothing, so no deeper particles take part there.
+//!
+//! Particles that sleep follow the coarse nodes, `u_p = Σ_i ζ_pi u_i`, so a vertex needs those alone, and what active particles deviate:
+//! ```text
+//! Σ_p w_p u_p = Σ_i ω_i u_i + Σ_{p active} w_p d_p        ω_i = Σ_p w_p ζ_pi,  d_p = u_p − Σ_i ζ_pi u_i
+//! ```
+//! A vertex of a smooth skin has some thirty particles of four nodes each, but few different nodes.
 use super::{
     composite::Anchor,
     partition::{NONE, Partition},
@@ -30,10 +36,12 @@ pub(super) struct SkinCarriers {
     first: Vec<u32>,
     /// Particles with their weights, of which none is zero.
     carriers: Vec<(u32, f64)>,
+    /// Index in `nodes` of the first entry of each vertex, and the end of the last.
+    first_node: Vec<u32>,
+    /// Coarse nodes with their weights `ω`, of which none is zero.
+    nodes: Vec<(u32, f64)>,
     /// Number in `anchors` of every particle, [`NONE`] of those that carry no vertex.
     number_of: Vec<u32>,
-    /// Particles that carry vertices, in the order in which they were found.
-    particles: Vec<u32>,
     anchors: Vec<Anchor>,
 }
 
@@ -54,7 +62,24 @@ impl SkinCarriers {
             }
             found.first.push(found.carriers.len() as u32);
         }
+        found.merge_anchors();
         found
+    }
+
+    /// Finds the nodes that each vertex follows while all of its particles sleep.
+    fn merge_anchors(&mut self) {
+        self.first_node.push(0);
+        for vertex in 0..self.vertices() {
+            let mut sums = BTreeMap::<u32, f64>::new();
+            for &(particle, weight) in self.of_vertex(vertex) {
+                let Anchor { nodes, weights, .. } = self.anchor(particle);
+                for (node, zeta) in nodes.iter().zip(weights) {
+                    *sums.entry(*node).or_default() += weight * zeta;
+                }
+            }
+            self.nodes.extend(sums.into_iter().filter(|(_, weight)| *weight != 0.0));
+            self.first_node.push(self.nodes.len() as u32);
+        }
     }
 
     fn push(&mut self, partition: &Partition, (particle, weight): (u32, f64)) {
@@ -62,7 +87,6 @@ impl SkinCarriers {
         let number = &mut self.number_of[particle as usize];
         if *number == NONE {
             *number = self.anchors.len() as u32;
-            self.particles.push(particle);
             self.anchors.push(partition.anchor(particle));
         }
     }
@@ -88,15 +112,16 @@ impl SkinCarriers {
         self.number_of[particle as usize] != NONE
     }
 
-    /// Returns the particles that carry vertices, with their anchors.
-    pub(super) fn particles(&self) -> impl ExactSizeIterator<Item = (u32, &Anchor)> {
-        self.particles.iter().copied().zip(&self.anchors)
+    /// Returns the coarse nodes that a vertex follows while all of its particles sleep, with their weights `ω`.
+    pub(super) fn nodes_of_vertex(&self, vertex: u32) -> &[(u32, f64)] {
+        let at = vertex as usize;
+        &self.nodes[self.first_node[at] as usize..self.first_node[at + 1] as usize]
     }
 
-    /// Returns `Σ w_p u_p` (m) of a vertex, with the displacements (m) of [`Self::particles`].
-    pub(super) fn moved_m(&self, vertex: u32, displacements_m: &[DVec3]) -> DVec3 {
-        let of = |particle: u32| displacements_m[self.number_of[particle as usize] as usize];
-        self.of_vertex(vertex).iter().map(|&(particle, weight)| of(particle) * weight).sum()
+    /// Returns `Σ ω_i a_i` of a vertex, with values of the coarse nodes.
+    #[inline]
+    pub(super) fn of_nodes(&self, vertex: u32, a: &[DVec3]) -> DVec3 {
+        self.nodes_of_vertex(vertex).iter().map(|&(node, weight)| a[node as usize] * weight).sum()
     }
 }
 

@@ -41,8 +41,6 @@ const GROUP: usize = broad::GROUP / CLUSTER;
 pub(in crate::contact) struct WallScratch {
     /// Positions (m) of the vertices of a skin whose vertices are no nodes.
     pub(super) x: Vec<DVec3>,
-    /// Displacements (m) of the particles that carry them.
-    pub(super) of_carriers_m: Vec<DVec3>,
     clusters: Vec<ClusterNow>,
     /// The boxes (m) around [`GROUP`] clusters each.
     groups: Vec<[DVec3; 2]>,
@@ -65,7 +63,6 @@ impl WallScratch {
         let nodes = walls.rest_m.len();
         Self {
             x: walls.rest_m.clone(),
-            of_carriers_m: vec![DVec3::ZERO; walls.carriers.of_skin],
             clusters: (0..walls.clusters.len()).map(|cluster| walls.cluster_now(cluster, &walls.rest_m)).collect(),
             groups: vec![[DVec3::ZERO; 2]; walls.clusters.len().div_ceil(GROUP)],
             near_groups: Vec::with_capacity(walls.clusters.len().div_ceil(GROUP)),

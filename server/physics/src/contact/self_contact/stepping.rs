@@ -32,7 +32,7 @@ impl ContactModel {
             return near.wakes_more();
         }
         let mut x = std::mem::take(&mut scratch.walls.x);
-        skin.place(&mut x, &mut scratch.walls.of_carriers_m);
+        skin.place(&mut x);
         let renewed = walls.renew(&x, scratch.exhaustive, near, &mut scratch.walls);
         scratch.walls.x = x;
         if renewed {

@@ -66,5 +66,10 @@ impl RunningPatch {
         for (x, &point) in x_particles.iter().zip(&self.points_of_active) {
             self.displacements_m[point as usize] = *x - self.points[point as usize].rest_m;
         }
+        for &number in &self.carrying {
+            let point = self.points_of_active[number as usize] as usize;
+            let asleep_m = self.points[point].anchor.of(&self.node_displacements_m);
+            self.deviations_m[number as usize] = self.displacements_m[point] - asleep_m;
+        }
     }
 }

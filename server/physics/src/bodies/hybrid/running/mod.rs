@@ -38,6 +38,12 @@ pub(crate) struct RunningPatch {
     points_of_active: Vec<u32>,
     /// Displacements (m) of the points.
     displacements_m: Vec<DVec3>,
+    /// Numbers, among the active particles, of those that carry the skin, ascending.
+    carrying: Vec<u32>,
+    /// How far (m) each active particle that carries the skin is from where it would be asleep.
+    deviations_m: Vec<DVec3>,
+    /// Number of every particle among the active ones, [`NONE`] for one that is asleep.
+    number_of: Vec<u32>,
     /// A buffer for the kernels' values of points.
     of_points: Vec<DVec3>,
     /// Awake cells, ascending.
@@ -95,6 +101,9 @@ impl RunningPatch {
             constrained: ConstrainedPoints::with_room(most_points),
             points_of_active: Vec::with_capacity(most_active),
             displacements_m: Vec::with_capacity(most_points),
+            carrying: Vec::with_capacity(most_active),
+            deviations_m: Vec::with_capacity(most_active),
+            number_of: vec![NONE; partition.particle_count()],
             of_points: Vec::with_capacity(most_points),
             cells: Vec::with_capacity(most_cells),
             rows: Vec::with_capacity(most_cells),
@@ -147,12 +156,18 @@ impl RunningPatch {
 
     /// Returns the number of a particle among the active ones, [`NONE`] for one that is asleep.
     pub(super) fn number_of(&self, particle: u32) -> u32 {
-        self.points.get(self.point_of(particle) as usize).map_or(NONE, |point| point.active)
+        self.number_of[particle as usize]
     }
 
     /// Returns the displacements (m) of the points after [`Self::displace`].
     pub(super) fn displacements_m(&self) -> &[DVec3] {
         &self.displacements_m
+    }
+
+    /// Returns how far (m) an active particle that carries the skin, given by its number, is from where it would be asleep, after
+    /// [`Self::displace`].
+    pub(super) fn deviation_of_m(&self, number: u32) -> DVec3 {
+        self.deviations_m[number as usize]
     }
 
     /// Returns the displacements (m) of the coarse nodes after [`Self::displace`].
@@ -225,16 +240,6 @@ impl RunningPatch {
         })
     }
 
-    /// Adds a force (N) on a point to that of the particle, or to those of the coarse nodes, that move it.
-    pub(super) fn push(&self, point: u32, force_n: DVec3, nodes: usize, forces_n: &mut [DVec3]) {
-        let point = &self.points[point as usize];
-        if point.active == NONE {
-            point.anchor.push(force_n, forces_n);
-        } else {
-            forces_n[nodes + point.active as usize] += force_n;
-        }
-    }
-
     /// Returns the active particles, ascending.
     pub(crate) fn active(&self) -> &[u32] {
         &self.active
@@ -288,6 +293,7 @@ impl RunningPatch {
         self.mark_carried(hybrid, false);
         for point in &self.points {
             self.point_of[point.particle as usize] = NONE;
+            self.number_of[point.particle as usize] = NONE;
         }
         for &cell in &self.cells {
             self.is_awake[cell as usize] = false;
@@ -335,12 +341,18 @@ impl RunningPatch {
             let next = self.points_of_active.len();
             if self.active.get(next) == Some(&point.particle) {
                 point.active = next as u32;
+                self.number_of[point.particle as usize] = next as u32;
                 self.points_of_active.push(number as u32);
             }
         }
         let numbered = (0..).zip(&self.points).filter(|(_, point)| point.active == NONE);
         self.constrained.take(numbered.map(|(number, point)| (number, point.anchor)));
         self.displacements_m.resize(self.points.len(), DVec3::ZERO);
+        self.carrying.clear();
+        let carries = |(_, particle): &(u32, &u32)| hybrid.skin_carriers.has(**particle);
+        self.carrying.extend((0..).zip(&self.active).filter(carries).map(|(number, _)| number));
+        self.deviations_m.clear();
+        self.deviations_m.resize(self.active.len(), DVec3::ZERO);
     }
 
     /// Takes the awake cells from the residual elements: `V_g ← V_g − (1 − ε) V_c`, and likewise `T_gi`.
