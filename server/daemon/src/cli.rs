@@ -5,7 +5,7 @@ use std::{ffi::OsString, path::Path, process::ExitCode};
 
 const EXAMPLES: &str = "\
 Examples:
-  palpated                                  serve the built-in ventricle, pressed by a simulated arm
+  palpated                                  serve the built-in heart, pressed by a simulated arm
   palpated serve my-organ.toml              serve your own scene
   palpated check my-organ.toml              what the body is like, and how long a tick takes here
   palpated simulate ventricle --out run     run headless: probes as CSV, frames as VTU, a JSON summary

@@ -1,7 +1,7 @@
 //! Scenes by name, path or text.
 use miette::{Diagnostic, Report};
 use palpate_proto::v1::load_scene_request::Source as WireSource;
-use palpate_scene::{Limits, Scene, builtin, builtin_names, load_file, parse};
+use palpate_scene::{Limits, Scene, builtin_names, load_builtin, load_file, parse};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 use tonic::Status;
@@ -23,16 +23,18 @@ struct UnknownScene {
 pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette::Result<Scene> {
     let limits = Limits::local();
     let path = Path::new(name);
-    let scene = match builtin(name) {
-        Some(text) if !path.is_file() => parse(text, name, None, &limits, progress),
-        None if !path.exists() => {
-            let near = builtin_names().iter().find(|known| strsim::jaro_winkler(name, known) > 0.8);
-            let near = near.map_or(String::new(), |near| format!("did you mean {near}? "));
-            return Err(UnknownScene { name: name.to_owned(), near, known: builtin_names().join(", ") }.into());
-        }
-        _ => load_file(path, &limits, progress),
-    };
-    scene.map_err(Report::new)
+    if path.is_file() {
+        return load_file(path, &limits, progress).map_err(Report::new);
+    }
+    if let Some(scene) = load_builtin(name, &limits, progress) {
+        return scene.map_err(Report::new);
+    }
+    if path.exists() {
+        return load_file(path, &limits, progress).map_err(Report::new);
+    }
+    let near = builtin_names().iter().find(|known| strsim::jaro_winkler(name, known) > 0.8);
+    let near = near.map_or(String::new(), |near| format!("did you mean {near}? "));
+    Err(UnknownScene { name: name.to_owned(), near, known: builtin_names().join(", ") }.into())
 }
 
 /// Loads what a client asks for. Text from the network may be no larger than [`Limits::wire`]; what the daemon's owner
@@ -42,13 +44,10 @@ pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette:
 /// `NOT_FOUND`, `PERMISSION_DENIED` or `INVALID_ARGUMENT`, with the scene's own message.
 pub fn from_wire(source: WireSource, folders: &[PathBuf]) -> Result<Scene, Status> {
     let scene = match source {
-        WireSource::Builtin(name) => {
-            let text = builtin(&name).ok_or_else(|| {
-                let known = builtin_names().join(", ");
-                Status::not_found(format!("there is no built-in scene \"{name}\"; there are: {known}"))
-            })?;
-            parse(text, &name, None, &Limits::wire(), &mut |_, _| ())
-        }
+        WireSource::Builtin(name) => load_builtin(&name, &Limits::wire(), &mut |_, _| ()).ok_or_else(|| {
+            let known = builtin_names().join(", ");
+            Status::not_found(format!("there is no built-in scene \"{name}\"; there are: {known}"))
+        })?,
         WireSource::Path(path) => load_file(&allowed(Path::new(&path), folders)?, &Limits::local(), &mut |_, _| ()),
         WireSource::Toml(text) => parse(&text, "request", None, &Limits::wire(), &mut |_, _| ()),
     };

@@ -262,7 +262,7 @@ fn a_folder_with_something_in_it_is_kept_unless_forced() {
 fn bad_scenes_are_shown_with_place_and_next_step() {
     let message = fails(&["check", "ventrikle"]);
     assert!(message.contains("there is no scene file \"ventrikle\""), "{message}");
-    assert!(message.contains("did you mean ventricle? built-in scenes: ventricle, cantilever"), "{message}");
+    assert!(message.contains("did you mean ventricle? built-in scenes: heart, ventricle, cantilever"), "{message}");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bad.toml");
     fs::write(&path, BEAM.replace("poisson_ratio = 0.3", "poisson_ratio = 0.5")).unwrap();
@@ -285,7 +285,7 @@ fn bad_scenes_are_shown_with_place_and_next_step() {
 fn the_schema_is_json_and_the_built_in_scenes_are_listed() {
     let schema: Value = serde_json::from_str(&succeeds(&["schema"])).unwrap();
     assert_eq!(schema["title"], Value::from("Document"));
-    assert_eq!(succeeds(&["check", "--list"]).lines().next(), Some("ventricle"));
+    assert_eq!(succeeds(&["check", "--list"]).lines().next(), Some("heart"));
 }
 
 /// A hybrid body at rest costs little; what counts is a tick with particles awake, whether the scene's tool comes near or not. And what is wrong with its lattice is said.

@@ -21,7 +21,7 @@ mod skin;
 pub mod timeline;
 pub mod wording;
 
-pub use builtin::{builtin, builtin_names};
+pub use builtin::{builtin, builtin_names, load_builtin};
 pub use drivers::{Driver, ScriptedHand};
 pub use error::{SceneError, Stage};
 pub use limits::Limits;

@@ -1,6 +1,6 @@
 //! From a file or a text to a [`Scene`].
 use crate::{
-    compile::{self, Files},
+    compile::{self, Files, FilesFrom},
     document::{schema, source::Source},
     error::{SceneError, Stage},
     limits::Limits,
@@ -38,9 +38,20 @@ pub fn parse(
     limits: &Limits,
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, SceneError> {
+    compiled(text, source_name, base_dir.map_or(FilesFrom::Nowhere, FilesFrom::Folder), limits, progress)
+}
+
+/// Does the same with files from wherever.
+pub(crate) fn compiled(
+    text: &str,
+    source_name: &str,
+    from: FilesFrom<'_>,
+    limits: &Limits,
+    progress: &mut dyn FnMut(f64, &str),
+) -> Result<Scene, SceneError> {
     progress(0.0, "reading the scene");
     let (source, document) = Source::read(source_name, text)?;
-    compile::compile(&document, &Files { base_dir, limits }, progress).map_err(|fault| source.error(fault))
+    compile::compile(&document, &Files { from, limits }, progress).map_err(|fault| source.error(fault))
 }
 
 /// What a scene's table of spring constants is made from, without the table.
@@ -50,7 +61,7 @@ pub fn parse(
 pub fn to_calibrate(path: &Path, limits: &Limits) -> Result<ToCalibrate, SceneError> {
     let (name, text) = read(path, limits)?;
     let (source, document) = Source::read(&name, &text)?;
-    let files = Files { base_dir: Some(path.parent().unwrap_or(Path::new("."))), limits };
+    let files = Files { from: FilesFrom::Folder(path.parent().unwrap_or(Path::new("."))), limits };
     compile::to_calibrate(&document, &files).map_err(|fault| source.error(fault))
 }
 

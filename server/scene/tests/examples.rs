@@ -1,7 +1,7 @@
 //! Every scene we ship loads, builds, and says what its comments claim.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use palpate_physics::Model;
-use palpate_scene::{Limits, Scene, builtin, builtin_names, load_file};
+use palpate_scene::{Limits, Scene, builtin, builtin_names, load_builtin, load_file};
 use std::path::PathBuf;
 
 fn folder() -> PathBuf {
@@ -40,19 +40,22 @@ fn every_example_loads_without_warnings_and_builds() {
 }
 
 #[test]
-fn built_in_scenes_are_the_shipped_files_and_need_no_other() {
-    assert_eq!(builtin_names().first(), Some(&"ventricle"));
+fn built_in_scenes_are_the_shipped_files_with_what_they_need() {
+    assert_eq!(builtin_names().first(), Some(&"heart"));
     for name in builtin_names() {
-        let text = builtin(name).unwrap();
-        let scene = palpate_scene::parse(text, name, None, &Limits::local(), &mut |_, _| {}).unwrap();
+        // A client may ask for each of them.
+        let scene = load_builtin(name, &Limits::wire(), &mut |_, _| {}).unwrap().unwrap();
         assert_eq!(scene.name, *name);
+        let file = folder().join(format!("{name}.toml"));
+        assert_eq!(builtin(name), std::fs::read_to_string(&file).ok().as_deref());
+        assert_eq!(format!("{:?}", scene.model), format!("{:?}", load(&file).model), "{name}");
     }
-    assert!(builtin("nothing").is_none());
+    assert!(builtin("nothing").is_none() && load_builtin("nothing", &Limits::wire(), &mut |_, _| {}).is_none());
 }
 
 #[test]
 fn the_default_scene_is_pressed_by_the_simulated_arm_every_two_seconds() {
-    let scene = load(&folder().join("ventricle.toml"));
+    let scene = load(&folder().join("heart.toml"));
     let arm = scene.arm.as_ref().unwrap();
     assert_eq!(arm.path.duration_s(), 2.0);
     assert_eq!(scene.model.tools[arm.tool].name, arm.tool_name);

@@ -46,7 +46,7 @@ try {
   await page.goto(url);
   await page.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   check("the page goes live", true);
-  check("the scene has its name", (await page.textContent("#scene-name")) === "ventricle");
+  check("the scene has its name", (await page.textContent("#scene-name")) === "heart");
   check("the mesh is counted", /\d+ vertices, \d+ faces/.test(await page.textContent("#mesh")), await page.textContent("#mesh"));
 
   // The simulated arm presses every two seconds: wait for a firm press.

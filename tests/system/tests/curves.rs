@@ -162,7 +162,7 @@ fn expected(daemon: &Daemon, hand: &Hand, recording: &Path) -> Curve {
 
 #[test]
 fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
-    let daemon = Daemon::start(&["--arm", "none"]);
+    let daemon = Daemon::start(&["--arm", "none", "ventricle"]);
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str| folder.path().join(name);
     let libhd = file("libHD.so");

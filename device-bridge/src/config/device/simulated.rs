@@ -31,7 +31,7 @@ pub struct KeyframeConfig {
 }
 
 impl Default for SimulatedConfig {
-    /// Presses the daemon's built-in ventricle and lets it go, every two seconds.
+    /// Presses the daemon's built-in heart and lets it go, every two seconds.
     fn default() -> Self {
         let arm = palpate_control::ArmSpec::default();
         Self {

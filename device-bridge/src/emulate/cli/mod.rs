@@ -25,20 +25,20 @@ use std::{
 /// Kinds of arms.
 #[derive(Debug, Subcommand)]
 pub enum Emulate {
-    /// A HapticMASTER over TCP; its hand presses the built-in ventricle every two seconds
+    /// A HapticMASTER over TCP; its hand presses the built-in heart every two seconds
     Hapticmaster(hapticmaster::Arguments),
-    /// A WoodenHaptics on a pseudo terminal; its hand presses the built-in ventricle every two seconds
+    /// A WoodenHaptics on a pseudo terminal; its hand presses the built-in heart every two seconds
     Woodenhaptics(woodenhaptics::Arguments),
-    /// A PHANToM for the library in libHD's place (docs/arms/phantom.md); its hand presses the built-in ventricle every two seconds
+    /// A PHANToM for the library in libHD's place (docs/arms/phantom.md); its hand presses the built-in heart every two seconds
     Phantom(phantom::Arguments),
-    /// A Haply Inverse3 and its service, over a WebSocket; its hand presses the built-in ventricle every two seconds
+    /// A Haply Inverse3 and its service, over a WebSocket; its hand presses the built-in heart every two seconds
     Inverse3(inverse3::Arguments),
-    /// A Haply 2diy on a pseudo terminal; its hand presses the built-in ventricle every two seconds
+    /// A Haply 2diy on a pseudo terminal; its hand presses the built-in heart every two seconds
     #[command(name = "haply-2diy")]
     Haply2diy(haply_2diy::Arguments),
-    /// A Novint Falcon on a pseudo terminal; its hand presses the built-in ventricle every two seconds
+    /// A Novint Falcon on a pseudo terminal; its hand presses the built-in heart every two seconds
     Falcon(falcon::Arguments),
-    /// A VRPN server with an arm; its hand presses the built-in ventricle every two seconds
+    /// A VRPN server with an arm; its hand presses the built-in heart every two seconds
     Vrpn(vrpn::Arguments),
 }
 

@@ -18,7 +18,7 @@ pub enum Arm {
 #[derive(Debug, Clone, clap::Args)]
 pub struct ServeArgs {
     /// Scene file or name of a built-in scene
-    #[arg(value_name = "SCENE", default_value = "ventricle")]
+    #[arg(value_name = "SCENE", default_value = "heart")]
     pub scene: String,
     /// Address and port for arms, viewers and the page; port 0 takes a free one
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7411")]

@@ -331,12 +331,8 @@ fn from_surfaces(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Body, Fault> {
     files.limits.check_tets(&at.key("target_tets"), table.target_tets.into())?;
-    let read = |key: &str, file: &str| -> Result<SurfaceFile, Fault> {
-        let at = at.key(key);
-        let path = files.resolve(&at, file)?;
-        files::read_surface(&path).map_err(|error| file_fault(&at, error))
-    };
-    let (inner, outer) = (read("inner_file", &table.inner_file)?, read("outer_file", &table.outer_file)?);
+    let inner = files.read_surface(&at.key("inner_file"), &table.inner_file)?;
+    let outer = files.read_surface(&at.key("outer_file"), &table.outer_file)?;
     let options = FillOptions { layers: table.layers, ..FillOptions::new(table.target_tets) };
     let mut part_of_load = |part: f64, what: &str| progress(0.1 + 0.65 * part, what);
     let inner_input = input(&inner, table.inner_unit.unwrap_or(table.unit).in_m());

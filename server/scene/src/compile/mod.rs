@@ -9,6 +9,7 @@ mod material;
 mod parts;
 mod probes;
 mod regions;
+mod scene_files;
 mod separate_parts;
 mod shape;
 mod starts;
@@ -20,7 +21,6 @@ use crate::{
         Document, IntegratorName, NumericsTable, OutputTable, PrecisionName,
         source::{Fault, Where},
     },
-    limits::Limits,
     scene::{BodySummary, OutputSettings, PartSummary, Scene, ToCalibrate},
 };
 use body::Body;
@@ -31,34 +31,7 @@ use palpate_physics::{
     settings::MAX_SUBSTEPS,
 };
 use regions::Regions;
-use std::path::{Path, PathBuf};
-
-/// Where a scene's files are, and how large they may be.
-pub(crate) struct Files<'a> {
-    /// The folder relative paths start at; `None`: no file may be read.
-    pub(crate) base_dir: Option<&'a Path>,
-    pub(crate) limits: &'a Limits,
-}
-
-impl Files<'_> {
-    /// The path of a file named in a scene.
-    fn resolve(&self, at: &Where, file: &str) -> Result<PathBuf, Fault> {
-        let Some(base) = self.base_dir else {
-            let message = format!("{at} refers to the file {file}, but this scene came without a folder");
-            return Err(Fault::value(at.clone(), message)
-                .help("send scenes that need no file, or have the daemon load the file from its own disk (`palpate-view load --on-daemon`)"));
-        };
-        let path = base.join(file);
-        // What cannot be asked is left to the reader, which says why.
-        let bytes = path.metadata().map_or(0, |metadata| metadata.len());
-        if bytes > self.limits.file_bytes {
-            let most = self.limits.file_bytes;
-            let message = format!("{at}: {} has {bytes} bytes; at most {most} are allowed here", path.display());
-            return Err(Fault::value(at.clone(), message));
-        }
-        Ok(path)
-    }
-}
+pub(crate) use scene_files::{Files, FilesFrom};
 
 /// Compiles a document.
 pub(crate) fn compile(

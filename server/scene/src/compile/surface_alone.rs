@@ -1,7 +1,7 @@
 //! `[body.surface]`: a surface file as a body without an inside, mended and told.
 use super::{
     Files,
-    body::{Body, BodyMesh, file_fault},
+    body::{Body, BodyMesh},
     kinds::BodyKind,
 };
 use crate::{
@@ -9,7 +9,6 @@ use crate::{
         body::SurfaceTable,
         source::{Fault, Where},
     },
-    files,
     fill::{self, Mended},
     wording::counted,
 };
@@ -23,8 +22,7 @@ pub(super) fn read(
     at: &Where,
 ) -> Result<Body, Fault> {
     let at = at.key("file");
-    let path = files.resolve(&at, &table.file)?;
-    let file = files::read_surface(&path).map_err(|error| file_fault(&at, error))?;
+    let file = files.read_surface(&at, &table.file)?;
     files.limits.check_tets(&at, file.triangles.len() as u64)?;
     let scale = table.unit.in_m();
     let mended = fill::mend(file.vertices.iter().map(|vertex| *vertex * scale).collect(), file.triangles);

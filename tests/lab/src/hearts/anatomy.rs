@@ -44,7 +44,7 @@ struct Muscle {
 
 impl Anatomy {
     /// A left ventricle of mean human size: 84 mm long, 62 mm wide, its wall 9.5 mm thick, two papillary muscles; its septum is at
-    /// negative `x`, so that what is at positive `x` is free wall.
+    /// negative `x`, so that what is at positive `x` is free wall. Its base is flat: a lattice of particles has a plane in it.
     pub(super) fn mean() -> Self {
         let mut heart = Self {
             semi_axes_m: DVec3::new(31e-3, 30e-3, 66e-3),
@@ -56,7 +56,7 @@ impl Anatomy {
             uneven: 0.08,
             thick_side_rad: PI,
             muscles: Vec::new(),
-            saddle_m: 2e-3,
+            saddle_m: 0.0,
             saddle_rad: 0.0,
         };
         // Antero-lateral and postero-medial.

@@ -1,4 +1,5 @@
 //! Hybrid bodies: coarse tetrahedra, and particles of which those near a contact are awake.
+mod held;
 mod inside;
 mod skin;
 mod touch;
@@ -115,6 +116,7 @@ impl ServedBody for HybridBody {
                     .to_owned(),
             );
         }
+        warnings.extend(held::warnings(model, self));
         warnings.extend(ripple::warning(model, spec));
         warnings
     }

@@ -1,5 +1,5 @@
 //! What carries the skin's vertices; their positions are computed when they are asked for.
-use super::{body::HybridBody, clusters::Displaced, composite::Anchor, partition::NONE, running::RunningPatch};
+use super::{body::HybridBody, clusters::Displaced, partition::NONE, running::RunningPatch};
 use crate::{
     contact::{CarriersThen, Skin},
     tick::CarriedSkin,

@@ -27,7 +27,7 @@ use palpate_physics::{
     contact::ToolSpec,
     mesh::{Triangulation, TriangulationError},
 };
-use std::{collections::BTreeSet, path::Path};
+use std::collections::BTreeSet;
 
 /// How a table comes to be there.
 const AGAIN: &str = "make it with `palpated calibrate`, whose argument is this scene";
@@ -175,7 +175,7 @@ pub(in crate::compile) fn to_calibrate(
             .help("write table_file = \"springs-table.json\" in place of other constants there")
     })?;
     let coarse = constants::coarse(table, &surface.vertex_areas_m2())?;
-    let table = files.base_dir.unwrap_or(Path::new(".")).join(file);
+    let table = files.place(file);
     Ok(ToCalibrate { surface, coarse, rings: refine.rings, table })
 }
 
