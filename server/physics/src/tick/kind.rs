@@ -239,6 +239,9 @@ pub(crate) trait Stepped<'a> {
     /// The force (N) that holds a node on its prescribed axes, its weight included: what the other forces lack. Zero on free axes.
     fn reaction_n(&self, node: usize, state: &MechanicalState) -> DVec3;
 
+    /// Moves reactions (N) at nodes that only the body knows of to those of the regions that are held.
+    fn move_reactions_to_faces(&self, _reactions_n: &mut [DVec3]) {}
+
     /// Comes before a tick: what is to wake or to fall asleep, to be refined or coarse, goes on its way. Allocates nothing.
     fn prepare(&mut self, _environment: &Environment, _state: &mut MechanicalState, _forces: &[PointForce]) {}
 

@@ -166,4 +166,5 @@ pub(super) fn write_reactions(
     for node in environment.prescribed.iter().flat_map(|set| &set.nodes).map(|&node| node as usize) {
         reaction_n[node] = body.reaction_n(node, state);
     }
+    body.move_reactions_to_faces(reaction_n);
 }

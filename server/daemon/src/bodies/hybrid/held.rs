@@ -1,36 +1,37 @@
-//! Whether what is held lies in planes of the lattice. Particles in such a plane are held by the coarse nodes in it; beside what lies across
-//! the lattice none is, and what is awake hangs on coarse nodes that give way (`docs/measurements/heart.md`).
+//! Flat regions that are held between planes of the lattice. Particles beside them are held in their place (`held_particles` in the physics crate), which
+//! lengthens or shortens the body by up to a spacing; over a region that is bent the errors are alike on both sides.
 use glam::DVec3;
 use palpate_physics::{Model, PrescribedSpec, bodies::hybrid::HybridBody};
+use palpate_scene::wording::short;
 
 /// Distance from a plane, over the spacing, that is none.
 const NONE: f64 = 1e-3;
 
-/// Says so of every held region that lies in no plane.
+/// Says so of every such region.
 pub(super) fn warnings(model: &Model, body: &HybridBody) -> Vec<String> {
     let sites = body.partition().sites();
     let in_spacings = |node: &u32| (model.rest_positions_m()[*node as usize] - sites.site_m(0)) / sites.spacing_m();
-    let told = |set: &&PrescribedSpec| {
-        let nodes: Vec<DVec3> = set.nodes.iter().map(in_spacings).collect();
-        !lies_in_a_plane(&nodes)
-    };
     let words = |set: &PrescribedSpec| {
-        format!(
-            "what is held as \"{}\" lies in no plane of the particles' lattice: near it the body gives way too easily, a heart with a base that \
-             is bent by 2 mm by a quarter in all; make it flat across x, y or z, and two of them a whole number of spacings apart",
-            set.name
-        )
+        let off = off_planes(set.nodes.iter().map(in_spacings))?;
+        Some(format!(
+            "what is held as \"{}\" is flat and lies {} mm off the planes of the particles' lattice: the body is up to a spacing ({} mm) too long or too \
+             short there; choose a spacing that its distance from what else is held is a multiple of",
+            set.name,
+            short(1e3 * off * sites.spacing_m()),
+            short(1e3 * sites.spacing_m())
+        ))
     };
-    model.prescribed().iter().filter(told).map(words).collect()
+    model.prescribed().iter().filter_map(words).collect()
 }
 
-/// Whether points (in spacings) lie in one plane of the lattice.
-fn lies_in_a_plane(points: &[DVec3]) -> bool {
-    let Some(first) = points.first() else { return true };
-    (0..3).any(|axis| {
-        let plane = first[axis].round();
-        points.iter().all(|point| (point[axis] - plane).abs() < NONE)
-    })
+/// How far points (in spacings) that lie in a plane across an axis are from the nearest plane of the lattice; `None` where some axis has them in one, or
+/// they lie in no such plane at all.
+fn off_planes(mut points: impl Iterator<Item = DVec3>) -> Option<f64> {
+    let first = points.next()?;
+    let (low, high) = points.fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
+    let across = (0..3).filter(|&axis| high[axis] - low[axis] < NONE);
+    let off = across.map(|axis| (first[axis] - first[axis].round()).abs()).reduce(f64::min)?;
+    (off > NONE).then_some(off)
 }
 
 #[cfg(test)]
@@ -38,11 +39,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_bent_or_between_planes_lies_in_none() {
-        let square = |z: [f64; 4]| [[0.3, 0.1], [2.6, 0.0], [2.4, 3.3], [0.0, 3.1]].map(|[x, y]| DVec3::new(x, y, 0.0)).into_iter().zip(z);
-        let in_plane = |z| lies_in_a_plane(&square(z).map(|(p, z)| p + DVec3::Z * z).collect::<Vec<_>>());
-        assert!(in_plane([2.0; 4]) && in_plane([2.0, 2.0001, 2.0, 2.0]));
-        assert!(!in_plane([2.5; 4]) && !in_plane([2.0, 2.4, 2.0, 2.4]) && !in_plane([2.0, 2.0, 3.0, 3.0]));
-        assert!(lies_in_a_plane(&[]));
+    fn what_is_flat_and_between_planes_is_told() {
+        let square = |z: [f64; 4]| {
+            let corners = [[0.3, 0.1], [2.6, 0.0], [2.4, 3.3], [0.0, 3.1]];
+            off_planes(corners.into_iter().zip(z).map(|([x, y], z)| DVec3::new(x, y, z)))
+        };
+        assert!((square([2.3; 4]).unwrap() - 0.3).abs() < 1e-12 && (square([2.9; 4]).unwrap() - 0.1).abs() < 1e-12);
+        assert!(square([2.0; 4]).is_none() && square([2.0, 2.4, 2.0, 2.4]).is_none());
+        assert!(off_planes(std::iter::empty()).is_none());
     }
 }

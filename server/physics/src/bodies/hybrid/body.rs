@@ -4,6 +4,7 @@ use super::{
     clusters::SkinClusters,
     composite::{Composite, NO_WEIGHT},
     embedding_mesh::{self, EmbeddingMesh},
+    held_particles::{self, HeldParticles},
     masses::Masses,
     moments::{CellMoments, Moments, integrate},
     partition::Partition,
@@ -11,7 +12,7 @@ use super::{
     projection::Lumping,
     seen::demand_seen,
     sites::Sites,
-    sizes,
+    sizes::{self, Site},
     skin_carriers::SkinCarriers,
     skin_influence::SkinInfluence,
     spec::{HybridError, ParticleSpec},
@@ -53,6 +54,8 @@ pub struct HybridBody {
     free_parts: Vec<DVec3>,
     /// Whether the body is held nowhere.
     pub(super) is_free: bool,
+    /// Particles that are held by nodes of their own.
+    held: HeldParticles,
     /// Whether each particle may wake: it has to follow some free node, to follow no node that is held along some axes
     /// only, and to lie within the coarse tets.
     pub(super) may_wake: Vec<bool>,
@@ -125,14 +128,19 @@ impl HybridBody {
             return Err(HybridError::Nothing { spacing_m });
         }
         let EmbeddingMesh { mesh, moved_m, outside_m } = covering(mesh, surface, prescribed, &sites, &moments);
-        let embedding = EmbeddingSummary::new(moved_m, &outside_m);
-        let composite = Composite::new(&mesh);
-        let prescribed = with_edges(&mesh, surface, &composite, prescribed);
+        let mut composite = Composite::new(&mesh);
+        let mut prescribed = with_edges(&mesh, surface, &composite, prescribed);
         let moments = match spec.fine_layers() {
             Some(layers) => merged(&sites, &composite, moments, layers, of_tet),
             None => moments,
         };
-        let partition = Partition::new_with(sites, composite, &moments, &mut |part| {
+        let marks = sizes::mark(&sites, &moments);
+        let particles = (0..marks.len()).filter(|&site| marks[site] == Site::Particle);
+        let held = held_particles::hold(&mesh, surface, &sites, particles, &mut composite, &mut prescribed);
+        let is_held = |at_m: &DVec3| held.node_at.keys().any(|&site| sites.site_m(site) == *at_m);
+        let outside_m: Vec<DVec3> = outside_m.into_iter().filter(|at_m| !is_held(at_m)).collect();
+        let embedding = EmbeddingSummary::new(moved_m, &outside_m);
+        let partition = Partition::new_with(sites, composite, &moments, &held.node_at, &mut |part| {
             progress(INTEGRATED + (COUNTED - INTEGRATED) * part);
         });
         progress(COUNTED);
@@ -161,6 +169,7 @@ impl HybridBody {
             free_parts: free.iter().map(|free| DVec3::select(*free, DVec3::ONE, DVec3::ZERO)).collect(),
             free,
             may_wake,
+            held,
             skin_influence: SkinInfluence::new(&skin_carriers, masses.node_kg.len(), spec.fine_depth_m.is_none()),
             skin_carriers,
             vertex_points,
@@ -250,6 +259,11 @@ impl HybridBody {
     /// Returns the axes along which coarse nodes may move.
     pub fn free(&self) -> &[BVec3] {
         &self.free
+    }
+
+    /// Moves the reactions (N) of held particles to corners of their held faces.
+    pub(crate) fn move_reactions_to_faces(&self, reactions_n: &mut [DVec3]) {
+        self.held.move_to_faces(reactions_n);
     }
 
     /// Returns whether a particle may wake.

@@ -112,6 +112,12 @@ impl Composite {
         Self { positions_m, tets, diagonal, locator: Locator::new(mesh) }
     }
 
+    /// Adds a node of no tet, and returns its number.
+    pub(super) fn add_node(&mut self, position_m: DVec3) -> u32 {
+        self.positions_m.push(position_m);
+        self.positions_m.len() as u32 - 1
+    }
+
     /// Returns the rest positions (m) of all coarse nodes.
     pub fn positions_m(&self) -> &[DVec3] {
         &self.positions_m

@@ -18,6 +18,7 @@ use super::{
     sizes::{self, Hanging, Site},
 };
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// The number that stands for an entry that does not exist.
 pub const NONE: u32 = u32::MAX;
@@ -60,20 +61,23 @@ pub struct Partition {
     particle_at: Vec<u32>,
     /// The coarse tet that each particle follows.
     tet_of_particle: Vec<u32>,
+    /// The coarse node of each particle that is held by one of its own ([`super::held_particles`]), [`NONE`] of others.
+    held_by: Vec<u32>,
     residual_elements: Vec<ResidualElement>,
 }
 
 impl Partition {
     /// Counts every cell to a coarse tet.
     pub fn new(sites: Sites, coarse: Composite, moments: &[CellMoments]) -> Self {
-        Self::new_with(sites, coarse, moments, &mut |_| {})
+        Self::new_with(sites, coarse, moments, &BTreeMap::new(), &mut |_| {})
     }
 
-    /// Does the same; `progress` is told the fraction done.
+    /// Does the same, with coarse nodes of their own for particles at some sites; `progress` is told the fraction done.
     pub(super) fn new_with(
         sites: Sites,
         coarse: Composite,
         moments: &[CellMoments],
+        node_at: &BTreeMap<usize, u32>,
         progress: &mut dyn FnMut(f64),
     ) -> Self {
         let mut tell = |third: f64, done: usize, all: usize| {
@@ -91,6 +95,7 @@ impl Partition {
             particles: Vec::new(),
             particle_at: vec![NONE; sites.site_count()],
             tet_of_particle: Vec::new(),
+            held_by: Vec::new(),
             residual_elements: vec![ResidualElement::default(); coarse.tets().len()],
             coarse,
         };
@@ -106,6 +111,7 @@ impl Partition {
                 partition.particle_at[site] = partition.particles.len() as u32;
                 partition.particles.push(site as u32);
                 partition.tet_of_particle.push(partition.coarse.anchor(sites.site_m(site)).tet);
+                partition.held_by.push(node_at.get(&site).copied().unwrap_or(NONE));
             }
         }
         if partition.has_doubled {
@@ -201,7 +207,11 @@ impl Partition {
 
     /// Returns the coarse nodes that a particle follows while it sleeps.
     pub fn anchor(&self, particle: u32) -> Anchor {
-        self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle))
+        let anchor = self.coarse.anchor_in(self.tet_of_particle[particle as usize], self.particle_m(particle));
+        match self.held_by[particle as usize] {
+            NONE => anchor,
+            node => Anchor { nodes: [node; 4], weights: [1.0, 0.0, 0.0, 0.0], ..anchor },
+        }
     }
 
     /// Returns the eight particles of a cell: those at its corners, in their order; in place of a hanging corner, the

@@ -131,6 +131,10 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         DVec3::select(held, -total_n, DVec3::ZERO)
     }
 
+    fn move_reactions_to_faces(&self, reactions_n: &mut [DVec3]) {
+        self.body.move_reactions_to_faces(reactions_n);
+    }
+
     fn prepare(&mut self, environment: &Environment, state: &mut MechanicalState, points: &[PointForce]) {
         self.switch_if_due(environment, state, points);
     }

@@ -129,7 +129,8 @@ fn solution(
     let (_, residual_n, relative_residual) = forces.residual(awakened);
     // The holder supplies what the other forces lack.
     let hold = |(free, f): (&BVec3, &DVec3)| DVec3::select(*free, DVec3::ZERO, -*f);
-    let node_reactions_n: Vec<DVec3> = awakened.body.free().iter().zip(&forces.total_n()).map(hold).collect();
+    let mut node_reactions_n: Vec<DVec3> = awakened.body.free().iter().zip(&forces.total_n()).map(hold).collect();
+    awakened.body.move_reactions_to_faces(&mut node_reactions_n);
     let of_set = |set: &PrescribedSpec| {
         let sum: DVec3 = set.nodes.iter().map(|&n| node_reactions_n[n as usize]).sum();
         DVec3::select(BVec3::from_array(set.axes), sum, DVec3::ZERO)

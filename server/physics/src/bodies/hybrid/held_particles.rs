@@ -1,0 +1,126 @@
+//! Particles that are held themselves, where a held face of the coarse tets lies across the lattice.
+//!
+//! What follows held coarse nodes alone is held; so are the particles in a lattice plane that a held face lies in. Beside any other held
+//! face particles follow free nodes, too, in part and beyond the face against them, and where all else is awake nothing holds these nodes: the
+//! body then gives way as if it were held deeper down, a heart with a base that is bent by 2 mm by a quarter. So particles beyond a held
+//! face, or less than `t` spacings before it, each get a coarse node of their own, which is held with the face.
+//!
+//! A cell that a held face cuts holds too little: with a particle `δ` before the face and one that is held beyond it, `h` from the first, its strain is
+//! `u/h` in a volume of `A δ`, where it should be `u/δ`. It gives way by `h²/δ` in place of `δ`; a particle that is held before the face makes the
+//! body too short by `δ`. Over all places of the face both are alike where
+//! ```text
+//! ∫_t^1 (1/s − s) ds = ∫_0^t s ds,   −ln t − (1 − t²)/2 = t²/2,   t = e^{−1/2}
+//! ```
+use super::{
+    composite::{Composite, NO_WEIGHT},
+    sites::Sites,
+};
+use crate::{
+    contact::closest_weights,
+    mesh::{Surface, TetMesh},
+    settings::PrescribedSpec,
+};
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// `t`, in spacings.
+const BEFORE: f64 = 0.606_530_659_712_633_4;
+/// How far, in spacings, a particle may be beyond a held face, or beside it: no farther than a cell reaches that holds some of the body there.
+const BEYOND: f64 = 2.0;
+
+/// The coarse nodes of held particles.
+#[derive(Debug, Clone, Default)]
+pub(super) struct HeldParticles {
+    /// The node of each site that is held.
+    pub(super) node_at: BTreeMap<usize, u32>,
+    /// Each of these nodes with a corner of its held face.
+    corner_of: BTreeMap<u32, u32>,
+}
+
+impl HeldParticles {
+    /// Moves the reactions (N) at particles' own nodes to corners of their held faces: who asks for the reaction of a held region knows these.
+    pub(super) fn move_to_faces(&self, reactions_n: &mut [DVec3]) {
+        for (&node, &corner) in &self.corner_of {
+            let reaction_n = std::mem::take(&mut reactions_n[node as usize]);
+            reactions_n[corner as usize] += reaction_n;
+        }
+    }
+}
+
+/// Gives particles beside held faces, of the sites told, nodes of their own, which go into the prescribed sets of these faces.
+pub(super) fn hold(
+    mesh: &TetMesh,
+    surface: &Surface,
+    sites: &Sites,
+    particles: impl Iterator<Item = usize>,
+    composite: &mut Composite,
+    prescribed: &mut [PrescribedSpec],
+) -> HeldParticles {
+    let mut held = HeldParticles::default();
+    let faces_of: Vec<Vec<Face>> = prescribed.iter().map(|set| faces(mesh, surface, set)).collect();
+    if faces_of.iter().all(Vec::is_empty) {
+        return held;
+    }
+    for site in particles {
+        let at_m = sites.site_m(site);
+        let spacing_m = sites.spacing_m();
+        for (set, faces) in prescribed.iter_mut().zip(&faces_of) {
+            let Some((face, near)) = nearest(faces, at_m) else { continue };
+            let is_beside = near.above_m > -BEFORE * spacing_m
+                && near.above_m < BEYOND * spacing_m
+                && near.aside_m < BEYOND * spacing_m;
+            let anchor = composite.anchor(at_m);
+            let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| weight.abs() >= NO_WEIGHT);
+            if is_beside && follows.any(|(node, _)| !set.nodes.contains(node)) {
+                let node = composite.add_node(at_m);
+                set.nodes.push(node);
+                held.node_at.insert(site, node);
+                held.corner_of.insert(node, face.nodes[near.corner]);
+                break;
+            }
+        }
+    }
+    held
+}
+
+/// A held face.
+struct Face {
+    nodes: [u32; 3],
+    corners_m: [DVec3; 3],
+    outwards: DVec3,
+}
+
+/// Where a point is beside a face.
+#[derive(Clone, Copy)]
+struct Beside {
+    /// Height (m) above the face, and distance (m) aside of it.
+    above_m: f64,
+    aside_m: f64,
+    /// The nearest corner.
+    corner: usize,
+}
+
+/// Faces all of whose corners are in a set that holds all axes.
+fn faces(mesh: &TetMesh, surface: &Surface, set: &PrescribedSpec) -> Vec<Face> {
+    let all = (0..surface.triangles.len()).map(|triangle| surface.triangle_nodes(triangle));
+    let held = all.filter(|nodes| set.axes == [true; 3] && nodes.iter().all(|node| set.nodes.contains(node)));
+    let face = |nodes: [u32; 3]| {
+        let corners_m @ [a, b, c] = nodes.map(|node| mesh.positions_m()[node as usize]);
+        Face { nodes, corners_m, outwards: (b - a).cross(c - a).normalize_or_zero() }
+    };
+    held.map(face).collect()
+}
+
+/// The face nearest to a point.
+fn nearest(faces: &[Face], at_m: DVec3) -> Option<(&Face, Beside)> {
+    let beside = |face: &Face| {
+        let weights = closest_weights(at_m, face.corners_m);
+        let nearest_m: DVec3 = face.corners_m.iter().zip(weights).map(|(corner_m, weight)| *corner_m * weight).sum();
+        let away_m = at_m - nearest_m;
+        let above_m = away_m.dot(face.outwards);
+        let corner = (0..3).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or_default();
+        (away_m.length_squared(), Beside { above_m, aside_m: (away_m - face.outwards * above_m).length(), corner })
+    };
+    let each = faces.iter().map(|face| (face, beside(face)));
+    each.min_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(face, (_, beside))| (face, beside))
+}
