@@ -19,11 +19,11 @@ const state = (page) => page.getAttribute("#connection", "data-state");
 /** Field 2 true or false. */
 const pause = (paused) => session(url, "Pause", Buffer.from([0x10, paused ? 1 : 0]));
 
-/** 4096 forces (field 2) of 1000 N along x (fields 2, 1) on vertex 30 (field 1) for 3 ticks (field 4). */
+/** 4096 forces (field 2) of 1000 N along x (fields 2, 1) on vertex 700 (field 1), far from the held base, for 3 ticks (field 4). */
 function breakTheBody() {
   const x = Buffer.alloc(9, 0x09);
   x.writeDoubleLE(1000, 1);
-  const force = Buffer.concat([Buffer.from([0x08, 30, 0x12, x.length]), x, Buffer.from([0x20, 3])]);
+  const force = Buffer.concat([Buffer.from([0x08, 0xbc, 0x05, 0x12, x.length]), x, Buffer.from([0x20, 3])]);
   return session(url, "InjectForces", Buffer.concat(Array(4096).fill(Buffer.concat([Buffer.from([0x12, force.length]), force]))));
 }
 

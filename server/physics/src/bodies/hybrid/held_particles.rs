@@ -12,7 +12,7 @@
 //! ∫_t^1 (1/s − s) ds = ∫_0^t s ds,   −ln t − (1 − t²)/2 = t²/2,   t = e^{−1/2}
 //! ```
 use super::{
-    composite::{Composite, NO_WEIGHT},
+    composite::{Anchor, Composite, NO_WEIGHT},
     sites::Sites,
 };
 use crate::{
@@ -21,7 +21,7 @@ use crate::{
     settings::PrescribedSpec,
 };
 use glam::DVec3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// `t`, in spacings.
 const BEFORE: f64 = 0.606_530_659_712_633_4;
@@ -57,21 +57,20 @@ pub(super) fn hold(
     prescribed: &mut [PrescribedSpec],
 ) -> HeldParticles {
     let mut held = HeldParticles::default();
-    let faces_of: Vec<Vec<Face>> = prescribed.iter().map(|set| faces(mesh, surface, set)).collect();
-    if faces_of.iter().all(Vec::is_empty) {
-        return held;
-    }
+    let spacing_m = sites.spacing_m();
+    let nodes_of: Vec<BTreeSet<u32>> = prescribed.iter().map(|set| set.nodes.iter().copied().collect()).collect();
+    let faces_of = prescribed.iter().zip(&nodes_of).map(|(set, nodes)| {
+        if set.axes == [true; 3] { faces(mesh, surface, nodes, BEYOND * spacing_m) } else { Vec::new() }
+    });
+    let faces_of: Vec<Vec<Face>> = faces_of.collect();
     for site in particles {
         let at_m = sites.site_m(site);
-        let spacing_m = sites.spacing_m();
-        for (set, faces) in prescribed.iter_mut().zip(&faces_of) {
+        for ((set, nodes), faces) in prescribed.iter_mut().zip(&nodes_of).zip(&faces_of) {
             let Some((face, near)) = nearest(faces, at_m) else { continue };
             let is_beside = near.above_m > -BEFORE * spacing_m
                 && near.above_m < BEYOND * spacing_m
                 && near.aside_m < BEYOND * spacing_m;
-            let anchor = composite.anchor(at_m);
-            let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| weight.abs() >= NO_WEIGHT);
-            if is_beside && follows.any(|(node, _)| !set.nodes.contains(node)) {
+            if is_beside && follows_others(&composite.anchor(at_m), nodes) {
                 let node = composite.add_node(at_m);
                 set.nodes.push(node);
                 held.node_at.insert(site, node);
@@ -83,11 +82,19 @@ pub(super) fn hold(
     held
 }
 
+/// Whether something that is anchored there follows any but these nodes.
+fn follows_others(anchor: &Anchor, nodes: &BTreeSet<u32>) -> bool {
+    let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| weight.abs() >= NO_WEIGHT);
+    follows.any(|(node, _)| !nodes.contains(node))
+}
+
 /// A held face.
 struct Face {
     nodes: [u32; 3],
     corners_m: [DVec3; 3],
     outwards: DVec3,
+    /// The corners (m) of a box that holds all that may be beside the face.
+    reach_m: [DVec3; 2],
 }
 
 /// Where a point is beside a face.
@@ -100,18 +107,19 @@ struct Beside {
     corner: usize,
 }
 
-/// Faces all of whose corners are in a set that holds all axes.
-fn faces(mesh: &TetMesh, surface: &Surface, set: &PrescribedSpec) -> Vec<Face> {
-    let all = (0..surface.triangles.len()).map(|triangle| surface.triangle_nodes(triangle));
-    let held = all.filter(|nodes| set.axes == [true; 3] && nodes.iter().all(|node| set.nodes.contains(node)));
+/// Faces all of whose corners are held; what is beside one is no farther above it, and no farther aside of it, than `beyond_m`.
+fn faces(mesh: &TetMesh, surface: &Surface, held: &BTreeSet<u32>, beyond_m: f64) -> Vec<Face> {
+    let reach = DVec3::splat(beyond_m * std::f64::consts::SQRT_2);
     let face = |nodes: [u32; 3]| {
         let corners_m @ [a, b, c] = nodes.map(|node| mesh.positions_m()[node as usize]);
-        Face { nodes, corners_m, outwards: (b - a).cross(c - a).normalize_or_zero() }
+        let reach_m = [a.min(b).min(c) - reach, a.max(b).max(c) + reach];
+        Face { nodes, corners_m, outwards: (b - a).cross(c - a).normalize_or_zero(), reach_m }
     };
-    held.map(face).collect()
+    let all = (0..surface.triangles.len()).map(|triangle| surface.triangle_nodes(triangle));
+    all.filter(|nodes| nodes.iter().all(|node| held.contains(node))).map(face).collect()
 }
 
-/// The face nearest to a point.
+/// The face nearest to a point, of those that it may be beside.
 fn nearest(faces: &[Face], at_m: DVec3) -> Option<(&Face, Beside)> {
     let beside = |face: &Face| {
         let weights = closest_weights(at_m, face.corners_m);
@@ -121,6 +129,7 @@ fn nearest(faces: &[Face], at_m: DVec3) -> Option<(&Face, Beside)> {
         let corner = (0..3).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or_default();
         (away_m.length_squared(), Beside { above_m, aside_m: (away_m - face.outwards * above_m).length(), corner })
     };
-    let each = faces.iter().map(|face| (face, beside(face)));
+    let in_reach = |face: &&Face| at_m.cmpge(face.reach_m[0]).all() && at_m.cmple(face.reach_m[1]).all();
+    let each = faces.iter().filter(in_reach).map(|face| (face, beside(face)));
     each.min_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(face, (_, beside))| (face, beside))
 }
