@@ -23,10 +23,8 @@ struct UnknownScene {
 pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette::Result<Scene> {
     let limits = Limits::local();
     let path = Path::new(name);
-    if path.is_file() {
-        return load_file(path, &limits, progress).map_err(Report::new);
-    }
-    if let Some(scene) = load_builtin(name, &limits, progress) {
+    let built_in = if path.is_file() { None } else { load_builtin(name, &limits, progress) };
+    if let Some(scene) = built_in {
         return scene.map_err(Report::new);
     }
     if path.exists() {

@@ -15,7 +15,7 @@ pub(super) fn warnings(model: &Model, body: &HybridBody) -> Vec<String> {
         let off = off_planes(set.nodes.iter().map(in_spacings))?;
         Some(format!(
             "what is held as \"{}\" is flat and lies {} mm off the planes of the particles' lattice: the body is up to a spacing ({} mm) too long or too \
-             short there; choose a spacing that its distance from what else is held is a multiple of",
+             short there; choose a spacing that divides its distance from the other held region",
             set.name,
             short(1e3 * off * sites.spacing_m()),
             short(1e3 * sites.spacing_m())
@@ -24,13 +24,14 @@ pub(super) fn warnings(model: &Model, body: &HybridBody) -> Vec<String> {
     model.prescribed().iter().filter_map(words).collect()
 }
 
-/// How far points (in spacings) that lie in a plane across an axis are from the nearest plane of the lattice; `None` where some axis has them in one, or
-/// they lie in no such plane at all.
+/// How far points (in spacings) that lie in a plane across one axis, and in no line, are from the nearest plane of the lattice; `None` of others, and where
+/// they lie in one.
 fn off_planes(mut points: impl Iterator<Item = DVec3>) -> Option<f64> {
     let first = points.next()?;
     let (low, high) = points.fold((first, first), |(low, high), p| (low.min(p), high.max(p)));
-    let across = (0..3).filter(|&axis| high[axis] - low[axis] < NONE);
-    let off = across.map(|axis| (first[axis] - first[axis].round()).abs()).reduce(f64::min)?;
+    let mut across = (0..3).filter(|&axis| high[axis] - low[axis] < NONE);
+    let (axis, None) = (across.next()?, across.next()) else { return None };
+    let off = (first[axis] - first[axis].round()).abs();
     (off > NONE).then_some(off)
 }
 
@@ -46,6 +47,8 @@ mod tests {
         };
         assert!((square([2.3; 4]).unwrap() - 0.3).abs() < 1e-12 && (square([2.9; 4]).unwrap() - 0.1).abs() < 1e-12);
         assert!(square([2.0; 4]).is_none() && square([2.0, 2.4, 2.0, 2.4]).is_none());
-        assert!(off_planes(std::iter::empty()).is_none());
+        // A pinned node, and an edge.
+        let line = |far: f64| off_planes([0.0, far].map(|y| DVec3::new(0.3, y, 0.4)).into_iter());
+        assert!(line(0.0).is_none() && line(2.5).is_none() && off_planes(std::iter::empty()).is_none());
     }
 }

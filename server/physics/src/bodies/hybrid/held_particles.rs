@@ -3,7 +3,8 @@
 //! What follows held coarse nodes alone is held; so are the particles in a lattice plane that a held face lies in. Beside any other held
 //! face particles follow free nodes, too, in part and beyond the face against them, and where all else is awake nothing holds these nodes: the
 //! body then gives way as if it were held deeper down, a heart with a base that is bent by 2 mm by a quarter. So particles beyond a held
-//! face, or less than `t` spacings before it, each get a coarse node of their own, which is held with the face.
+//! face, or less than `t` spacings before it, each get a coarse node of their own, which is held with the face. Those of another part of the body, across
+//! a gap, follow none of the face's nodes, and are not beside it.
 //!
 //! A cell that a held face cuts holds too little: with a particle `δ` before the face and one that is held beyond it, `h` from the first, its strain is
 //! `u/h` in a volume of `A δ`, where it should be `u/δ`. It gives way by `h²/δ` in place of `δ`; a particle that is held before the face makes the
@@ -70,7 +71,7 @@ pub(super) fn hold(
             let is_beside = near.above_m > -BEFORE * spacing_m
                 && near.above_m < BEYOND * spacing_m
                 && near.aside_m < BEYOND * spacing_m;
-            if is_beside && follows_others(&composite.anchor(at_m), nodes) {
+            if is_beside && follows_in_part(&composite.anchor(at_m), nodes) {
                 let node = composite.add_node(at_m);
                 set.nodes.push(node);
                 held.node_at.insert(site, node);
@@ -82,10 +83,11 @@ pub(super) fn hold(
     held
 }
 
-/// Whether something that is anchored there follows any but these nodes.
-fn follows_others(anchor: &Anchor, nodes: &BTreeSet<u32>) -> bool {
-    let mut follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| weight.abs() >= NO_WEIGHT);
-    follows.any(|(node, _)| !nodes.contains(node))
+/// Whether something that is anchored there follows some of these nodes, and others.
+fn follows_in_part(anchor: &Anchor, nodes: &BTreeSet<u32>) -> bool {
+    let follows = anchor.nodes.iter().zip(anchor.weights).filter(|(_, weight)| weight.abs() >= NO_WEIGHT);
+    let (own, others): (Vec<_>, Vec<_>) = follows.partition(|(node, _)| nodes.contains(node));
+    !own.is_empty() && !others.is_empty()
 }
 
 /// A held face.
@@ -132,4 +134,38 @@ fn nearest(faces: &[Face], at_m: DVec3) -> Option<(&Face, Beside)> {
     let in_reach = |face: &&Face| at_m.cmpge(face.reach_m[0]).all() && at_m.cmple(face.reach_m[1]).all();
     let each = faces.iter().filter(in_reach).map(|face| (face, beside(face)));
     each.min_by(|a, b| a.1.0.total_cmp(&b.1.0)).map(|(face, (_, beside))| (face, beside))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::tet_box;
+
+    /// Of two slabs with a gap of 5 mm the lower one is held above, 2 mm over a plane of a lattice of 4 mm: particles of that plane and of the next one,
+    /// in the gap, are held, and none in the upper slab, which is less than two spacings from the face.
+    #[test]
+    fn what_is_across_a_gap_is_not_held() {
+        let size = DVec3::new(0.04, 0.04, 0.02);
+        let [lower, upper] = [-0.02, 0.005].map(|z| tet_box(DVec3::Z * z, size, [2, 2, 1]));
+        let of_lower = lower.positions_m().len() as u32;
+        let positions = [lower.positions_m(), upper.positions_m()].concat();
+        let shifted = upper.tets().iter().map(|tet| tet.map(|node| node + of_lower));
+        let mesh = TetMesh::new(positions, lower.tets().iter().copied().chain(shifted).collect()).unwrap();
+        let mut composite = Composite::new(&mesh);
+        let nodes = composite.positions_m().iter().enumerate().filter(|(_, p)| p.z == 0.0).map(|(node, _)| node as u32);
+        let mut prescribed = [PrescribedSpec { name: "top".into(), nodes: nodes.collect(), axes: [true; 3] }];
+        let sites = Sites::covering((DVec3::Z * -0.02, DVec3::new(0.04, 0.04, 0.025)), 4e-3, DVec3::Z * -2e-3);
+        let surface = Surface::of(&mesh).unwrap();
+        let held = hold(&mesh, &surface, &sites, 0..sites.site_count(), &mut composite, &mut prescribed);
+        let heights_mm: BTreeSet<i64> =
+            held.node_at.keys().map(|&site| (1e3 * sites.site_m(site).z).round() as i64).collect();
+        assert_eq!(heights_mm, BTreeSet::from([-2, 2]));
+        // Eleven sites to a side, in either plane, and as many nodes; their reactions go to the face.
+        assert!(held.node_at.len() >= 2 * 11 * 11, "{}", held.node_at.len());
+        let mut reactions_n = vec![DVec3::X; composite.positions_m().len()];
+        held.move_to_faces(&mut reactions_n);
+        let of_face: DVec3 = prescribed[0].nodes.iter().map(|&node| reactions_n[node as usize]).sum();
+        assert!((of_face.x - prescribed[0].nodes.len() as f64).abs() < 1e-9);
+        assert!(held.node_at.values().all(|&node| reactions_n[node as usize] == DVec3::ZERO));
+    }
 }
