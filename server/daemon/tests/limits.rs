@@ -211,7 +211,7 @@ fn particles_outside_the_coarse_tets_are_told_with_their_place_by_every_command(
         2.0,
         "[[region]]\nname = \"half\"\nselect = { region = \"outer\", half_space = { point_mm = [0, 0, 0], normal = [-1, 0, 0] } }\n\
          [[fixed]]\nregion = \"half\"\n[[load]]\nregion = \"inner\"\npressure_pa = 10\nfollower = false\namplitude.constant = 1",
-        "[body.sphere_shell]\ninner_radius_mm = 12\nouter_radius_mm = 30\ntarget_tets = 100",
+        "[body.sphere_shell]\ninner_radius_mm = 12\nouter_radius_mm = 30\ntarget_tets = 60",
     );
     for (scene, sign, strict) in [(&few, "note: ", 0), (&many, "warning: ", 1)] {
         let check = run("check", scene, &["--strict"]);

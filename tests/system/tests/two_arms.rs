@@ -8,7 +8,10 @@ use lab::{
     arms::{self, Hand},
 };
 use palpate_bridge::config::WorkspaceConfig;
-use palpate_system_tests::{daemon::Daemon, root};
+use palpate_system_tests::{
+    daemon::{Daemon, PATIENCE},
+    root,
+};
 use std::time::{Duration, Instant};
 
 /// In and out, twice a second: both press from 0.1 to 0.35 s.
@@ -55,9 +58,14 @@ fn two_arms_press_the_same_heart_each_with_its_tool_and_its_limits() {
     names.sort();
     assert_eq!(names, ["arm of the finger", "arm of the shaft"], "{status:#}");
 
-    // The body is pressed from both sides at the same time.
+    // The body is pressed from both sides at the same time, and as hard as the hand goes deep. Links of a busy machine
+    // withhold forces now and then: how long it takes is not asked.
     let (began, mut together_n) = (Instant::now(), 0.0_f64);
-    while began.elapsed() < look() {
+    let pressed = |together_n| {
+        let (finger, shaft) = (finger.handle.stats().summary(), shaft.handle.stats().summary());
+        together_n > 0.1 && finger.peak_force_n > 0.4 && shaft.saturated > 0
+    };
+    while began.elapsed() < look() || (!pressed(together_n) && began.elapsed() < PATIENCE) {
         together_n = together_n.max(finger.handle.stats().force_n().min(shaft.handle.stats().force_n()));
         std::thread::sleep(Duration::from_millis(2));
     }
