@@ -1,8 +1,8 @@
 //! Samples of a tool's axis, about which bodies are fine that are coarse elsewhere: a sphere's centre, several points
 //! along a capsule.
 use super::{
-    broad::{FittedBoxes, Skin},
-    nearest::{deepest_m, nearest_vertex},
+    broad::Skin,
+    nearest::{Known, deepest_m, nearest_vertex},
     tool::{ToolSpec, ToolState},
 };
 use glam::DVec3;
@@ -67,24 +67,18 @@ impl AxisSample {
     /// Finds the vertex of a skin, of which a query has begun, that is nearest to where the tool is deepest in it here,
     /// or, where the tool does not touch it, to this sample. Vertices are sought within a gap of `2 near_m`, or
     /// `near_m + cover_m` of a tool that touches: no point of the skin is farther than `cover_m` from a vertex.
-    /// `fitted` are contact's boxes, where they may be used.
     ///
     /// A vertex at distance `d` from the middle of a piece that reaches `s` to either side is no nearer to the piece
     /// than `√(d² − s²)`, and the vertex nearest to the middle bounds the others: no piece that is near is missed, and
     /// some are found too early.
-    pub(crate) fn look(
-        &self,
-        skin: &impl Skin,
-        (near_m, cover_m): (f64, f64),
-        fitted: Option<FittedBoxes<'_>>,
-    ) -> Near {
+    pub(crate) fn look(&self, skin: &impl Skin, (near_m, cover_m): (f64, f64), known: Known<'_>) -> Near {
         let s = self.half_piece_m;
         // A tool that touches has a vertex within `cover_m` of where it does; the rest is a margin for a stretched
         // skin.
         let touching_m = near_m + cover_m;
         let reach_m = if self.deepest_m.is_some() { touching_m.max(2.0 * near_m) } else { 2.0 * near_m };
         let within_m = (self.radius_m + reach_m).hypot(s);
-        let from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, fitted);
+        let from = |from_m: DVec3| nearest_vertex(skin, from_m, within_m, known);
         let gap_m = |d: f64| if s > 0.0 { (d * d - s * s).max(0.0).sqrt() } else { d } - self.radius_m;
         let beside = || {
             let vertex = from(self.at_m);
@@ -156,7 +150,7 @@ mod tests {
         let cloud = Cloud { at_m: at_m.to_vec(), ids: vec![0, 1, 2] };
         let tool = ToolState { centre_m: DVec3::ZERO, contact_force_n: 0.1 * DVec3::Y, ..ToolState::at_start(&spec) };
         let looks: Vec<Near> =
-            tool.axis_samples(&spec, 5).map(|sample| sample.look(&cloud, (3e-3, 1e-3), None)).collect();
+            tool.axis_samples(&spec, 5).map(|sample| sample.look(&cloud, (3e-3, 1e-3), Known::default())).collect();
         let found = [looks[0], looks[4]].map(|near| (near.vertex.map(|(vertex, _)| vertex), near.gap_m));
         assert_eq!(found, [(Some(0), 0.0), (Some(1), 0.0)]);
     }
@@ -187,7 +181,14 @@ mod tests {
             let cloud = Cloud { ids: (0..at_m.len() as u32).collect(), at_m };
             let count = spec.axis_sample_count(apart_m);
             let samples = tool.axis_samples(&spec, count);
-            let looks: Vec<Near> = samples.map(|sample| sample.look(&cloud, (near_m, cover_m), None)).collect();
+            let looks: Vec<Near> = 
+                samples.map(|sample| sample.look(&cloud, (near_m, cover_m), Known::default())).collect();
+            // Whatever vertex is told to be near, the same are found.
+            for vertex in 0..cloud.at_m.len() as u32 {
+                let known = Known { vertex: Some(vertex), fitted: None };
+                let again = tool.axis_samples(&spec, count).map(|sample| sample.look(&cloud, (near_m, cover_m), known));
+                prop_assert!(again.zip(&looks).all(|(again, look)| (again.vertex, again.gap_m) == (look.vertex, look.gap_m)));
+            }
             let least_m = looks.iter().map(|near| near.gap_m).fold(f64::INFINITY, f64::min);
             let touches = contact_force_n != DVec3::ZERO;
             let reach_m = if touches { (near_m + cover_m).max(2.0 * near_m) } else { 2.0 * near_m };

@@ -42,7 +42,7 @@ pub use following::{CoupledFollowing, Following};
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
 pub use moduli::SurfaceModuli;
-pub(crate) use nearest::deepest_m;
+pub(crate) use nearest::{Known, deepest_m};
 pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub use sample_potential::SamplePotential;

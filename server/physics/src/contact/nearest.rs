@@ -4,34 +4,49 @@ use glam::DVec3;
 
 const NONE: u32 = u32::MAX;
 
+/// What may shorten a search for the nearest vertex; what is found is the same without it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Known<'a> {
+    /// Contact's boxes, where they may be used.
+    pub(crate) fitted: Option<FittedBoxes<'a>>,
+    /// A vertex that may be near. It rules out most of the others at once.
+    pub(crate) vertex: Option<u32>,
+}
+
 /// Returns the vertex nearest to a point, if one is within a distance (m), and its distance (m), on a skin of which a
-/// query has begun; of several that are as near, the first one. `fitted` are contact's boxes, where they may be used.
+/// query has begun; of several that are as near, the first one.
 pub(crate) fn nearest_vertex(
     skin: &impl Skin,
     from_m: DVec3,
     within_m: f64,
-    fitted: Option<FittedBoxes<'_>>,
+    known: Known<'_>,
 ) -> Option<(u32, f64)> {
-    let bound_m = |cluster: usize| {
-        let of_fitted_m = fitted.map_or(0.0, |fitted| fitted.boxes[cluster].distance_bound_m(from_m, fitted.travel_m));
-        skin.cluster_distance_m(cluster, from_m).max(of_fitted_m)
+    let of_fitted_m = |cluster: usize| {
+        known.fitted.map_or(0.0, |fitted| fitted.boxes[cluster].distance_bound_m(from_m, fitted.travel_m))
     };
     let in_group = GROUP / CLUSTER;
     let clusters = skin.clusters();
     let groups = 0..clusters.div_ceil(in_group);
     let of_group = |group: usize| group * in_group..((group + 1) * in_group).min(clusters);
-    let mut found = (within_m, NONE);
-    // The first cluster should be near: it rules out most of the others.
-    let near = |group: &usize| skin.group_distance_m(*group, from_m) <= within_m;
-    let all = groups.clone().filter(near).flat_map(of_group);
-    let first = all.map(|cluster| (bound_m(cluster), cluster)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
-    look_at(skin, first, from_m, &mut found);
+    let (mut found, mut first) = ((within_m, NONE), clusters);
+    let known_m = known.vertex.map(|vertex| (skin.position_m(vertex).distance(from_m), vertex));
+    if let Some(near) = known_m.filter(|(distance_m, _)| *distance_m < within_m) {
+        found = near;
+    } else {
+        // The first cluster should be near: it rules out most of the others.
+        let near = |group: &usize| skin.group_distance_m(*group, from_m) <= within_m;
+        let bound_m = |cluster: usize| skin.cluster_distance_m(cluster, from_m).max(of_fitted_m(cluster));
+        let all = groups.clone().filter(near).flat_map(of_group);
+        first = all.map(|cluster| (bound_m(cluster), cluster)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        look_at(skin, first, from_m, &mut found);
+    }
     for group in groups {
         if skin.group_distance_m(group, from_m) > found.0 + ROUNDING_M {
             continue;
         }
         for cluster in of_group(group) {
-            if cluster != first && bound_m(cluster) <= found.0 + ROUNDING_M {
+            let is_near = |bound_m: f64| bound_m <= found.0 + ROUNDING_M;
+            if cluster != first && is_near(of_fitted_m(cluster)) && is_near(skin.cluster_distance_m(cluster, from_m)) {
                 look_at(skin, cluster, from_m, &mut found);
             }
         }

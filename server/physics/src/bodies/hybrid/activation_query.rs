@@ -2,14 +2,18 @@
 use super::{
     body::HybridBody,
     carried_skin::SkinView,
+    crushed_cells::CrushedCells,
+    load_claims::{LoadClaims, NearestParticles},
+    partition::NONE,
+    projection::Projection,
     running::RunningPatch,
     scratch::HybridScratch,
-    spec::ParticleSpec,
+    spec::{ParticleSpec, Waking},
     state::{HybridState, axis_sample_counts},
-    switching::{ActivationQuery, Ball, FOLLOW, GAP, LOOK_EVERY_TICKS, QUERY_EVERY_TICKS},
+    switching::{Ball, FOLLOW, GAP, LOOK_EVERY_TICKS, QUERY_EVERY_TICKS},
 };
 use crate::{
-    contact::{Near, Skin},
+    contact::{Known, Near, Skin},
     tick::{Environment, MechanicalState, PointForce},
 };
 use glam::DVec3;
@@ -33,6 +37,7 @@ pub(super) fn update_balls(
     view: &mut SkinView<'_>,
     body: &HybridBody,
     own: &mut HybridState,
+    nearest_before: &mut [u32],
     state: &MechanicalState,
 ) {
     let MechanicalState { tools, contact, force_is_current, .. } = state;
@@ -42,9 +47,11 @@ pub(super) fn update_balls(
     let samples = tools.iter().zip(&environment.tools).zip(axis_sample_counts(body, &environment.tools));
     let samples =
         samples.flat_map(|((tool, spec), count)| tool.axis_samples(spec, count).map(move |sample| (sample, spec)));
-    for ((sample, spec), ball) in samples.zip(&mut own.balls) {
+    for (((sample, spec), ball), before) in samples.zip(&mut own.balls).zip(nearest_before) {
         let near_m = (GAP * spec.radius_m).max(GAP * spacing_m) + AHEAD_S * sample.speed_m_per_s;
-        let Near { vertex, gap_m, .. } = sample.look(view, (near_m, environment.contact.covering_radius_m), fitted);
+        let known = Known { fitted, vertex: known_vertex(*before) };
+        let Near { vertex, gap_m, .. } = sample.look(view, (near_m, environment.contact.covering_radius_m), known);
+        *before = vertex.map_or(NONE, |(vertex, _)| vertex);
         match (ball.as_mut(), vertex) {
             (_, Some((vertex, _))) if gap_m < near_m => {
                 let rest_m = body.skin_rest_m()[vertex as usize];
@@ -62,6 +69,10 @@ pub(super) fn update_balls(
             (None, _) => {}
         }
     }
+}
+
+fn known_vertex(before: u32) -> Option<u32> {
+    (before != NONE).then_some(before)
 }
 
 /// Returns whether a part of a tool moves by half a spacing between two looks.
@@ -96,7 +107,10 @@ pub(super) fn meets_sleeping_skin(
     let mut view = SkinView::new(body, patch);
     view.begin();
     let counts = axis_sample_counts(body, &environment.tools);
+    let mut first = 0;
     tools.iter().zip(&environment.tools).zip(counts).enumerate().any(|(index, ((tool, spec), count))| {
+        let nearest_before = &mut scratch.query.nearest_before[first..first + count];
+        first += count;
         let near_of = |speed_m_per_s: f64| (ARRIVES_S * speed_m_per_s).max(0.1 * body.particles.spacing_m);
         let fastest_m_per_s = tool.axis_samples(spec, count).map(|sample| sample.speed_m_per_s).fold(0.0, f64::max);
         let listed = contact.listed_within(index, near_of(fastest_m_per_s)).filter(|_| *force_is_current);
@@ -105,9 +119,11 @@ pub(super) fn meets_sleeping_skin(
         {
             return false;
         }
-        tool.axis_samples(spec, count).any(|sample| {
+        tool.axis_samples(spec, count).zip(nearest_before).any(|(sample, before)| {
             let near_m = near_of(sample.speed_m_per_s);
-            let near = sample.look(&view, (near_m, environment.contact.covering_radius_m), fitted);
+            let known = Known { fitted, vertex: known_vertex(*before) };
+            let near = sample.look(&view, (near_m, environment.contact.covering_radius_m), known);
+            *before = near.vertex.map_or(*before, |(vertex, _)| vertex);
             near.gap_m < near_m && near.vertex.is_some_and(|(vertex, _)| is_asleep(vertex))
         })
     })
@@ -176,7 +192,76 @@ fn balls_of_tools<'a>(
     })
 }
 
+/// An activation query, which finds the particles that are to be awake, and buffers of switches.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ActivationQuery {
+    /// The vertex that each axis sample was nearest to last, [`NONE`] where none is known. It only tells where to search first.
+    pub(super) nearest_before: Vec<u32>,
+    /// Particles in a tool's balls, each with its squared distance (m²).
+    pub(super) found: Vec<(f64, u32)>,
+    /// Whether each particle is among these.
+    pub(super) is_found: Vec<bool>,
+    /// What loads want.
+    pub(super) load_claims: LoadClaims,
+    /// A buffer of what loads and injected forces want.
+    pub(super) nearest: NearestParticles,
+    /// Particles that are to be awake.
+    pub(super) wanted: Vec<u32>,
+    /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
+    pub(super) unwanted: Vec<(f64, u32)>,
+    pub(super) crushed_cells: CrushedCells,
+    pub(super) moved: Vec<DVec3>,
+    /// Impulses (kg m/s) transferred to coarse nodes.
+    pub(super) impulses: Vec<DVec3>,
+    /// Forces (N) transferred to coarse nodes.
+    pub(super) transferred_n: Vec<DVec3>,
+    pub(super) projection: Projection,
+    /// Positions (m) of the coarse nodes before a switch, and their displacements (m) by it.
+    pub(super) were_m: Vec<DVec3>,
+    pub(super) shifts_m: Vec<DVec3>,
+    /// Particles that were active before a switch.
+    pub(super) left: Vec<u32>,
+    /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
+    pub(super) weights_kg: Vec<f64>,
+}
+
 impl ActivationQuery {
+    pub(super) fn new(body: &HybridBody, environment: &Environment) -> Self {
+        let (particles, tools) = (&body.particles, &environment.tools[..]);
+        let load_claims = match particles.waking {
+            Waking::ByHand => LoadClaims::default(),
+            Waking::ByTools { reach_m } => LoadClaims::new(environment, body, reach_m),
+        };
+        let in_ball = match particles.waking {
+            Waking::ByHand => 0,
+            Waking::ByTools { reach_m } => (2.0 * reach_m / particles.spacing_m + 2.0).powi(3) as usize,
+        };
+        let most = particles.most_active;
+        let most_wanted = tools.len().max(1) * most;
+        Self {
+            nearest_before: vec![NONE; axis_sample_counts(body, tools).sum()],
+            found: Vec::with_capacity(
+                in_ball
+                    .saturating_mul(axis_sample_counts(body, tools).max().unwrap_or_default())
+                    .min(body.partition.particle_count()),
+            ),
+            is_found: vec![false; body.partition.particle_count()],
+            load_claims,
+            nearest: NearestParticles::with_room(body.partition.particle_count()),
+            wanted: Vec::with_capacity(most_wanted),
+            unwanted: Vec::with_capacity(most),
+            crushed_cells: CrushedCells::new(body),
+            moved: Vec::with_capacity(most),
+            impulses: Vec::with_capacity(body.node_count() + most),
+            transferred_n: Vec::with_capacity(body.node_count()),
+            projection: Projection::with_room(body, most),
+            were_m: Vec::with_capacity(body.node_count()),
+            shifts_m: Vec::with_capacity(body.node_count()),
+            left: Vec::with_capacity(most),
+            weights_kg: Vec::with_capacity(body.node_count()),
+        }
+    }
+
     /// Finds the particles that tools, loads and injected forces want, ascending. Where there is no room for all, each
     /// claim gets as many: of a tool those nearest to the middles of its balls, and to the lines between those of
     /// neighbours; of loads those nearest to where they act (see [`super::load_claims`]). The room of `occupied` particles

@@ -64,74 +64,6 @@ pub(crate) struct Ball {
     pub(super) away_ticks: u32,
 }
 
-/// An activation query, which finds the particles that are to be awake, and buffers of switches.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ActivationQuery {
-    /// Particles in a tool's balls, each with its squared distance (m²).
-    pub(super) found: Vec<(f64, u32)>,
-    /// Whether each particle is among these.
-    pub(super) is_found: Vec<bool>,
-    /// What loads want.
-    pub(super) load_claims: LoadClaims,
-    /// A buffer of what loads and injected forces want.
-    pub(super) nearest: NearestParticles,
-    /// Particles that are to be awake.
-    pub(super) wanted: Vec<u32>,
-    /// Active particles that no tool wants, each with its distance (m) from where it would be asleep.
-    pub(super) unwanted: Vec<(f64, u32)>,
-    crushed_cells: CrushedCells,
-    moved: Vec<DVec3>,
-    /// Impulses (kg m/s) transferred to coarse nodes.
-    impulses: Vec<DVec3>,
-    /// Forces (N) transferred to coarse nodes.
-    transferred_n: Vec<DVec3>,
-    projection: Projection,
-    /// Positions (m) of the coarse nodes before a switch, and their displacements (m) by it.
-    were_m: Vec<DVec3>,
-    shifts_m: Vec<DVec3>,
-    /// Particles that were active before a switch.
-    left: Vec<u32>,
-    /// Masses (kg) of the free nodes of tets in which particles fall asleep, 0 of others.
-    weights_kg: Vec<f64>,
-}
-
-impl ActivationQuery {
-    pub(super) fn new(body: &HybridBody, environment: &Environment) -> Self {
-        let (particles, tools) = (&body.particles, &environment.tools[..]);
-        let load_claims = match particles.waking {
-            Waking::ByHand => LoadClaims::default(),
-            Waking::ByTools { reach_m } => LoadClaims::new(environment, body, reach_m),
-        };
-        let in_ball = match particles.waking {
-            Waking::ByHand => 0,
-            Waking::ByTools { reach_m } => (2.0 * reach_m / particles.spacing_m + 2.0).powi(3) as usize,
-        };
-        let most = particles.most_active;
-        let most_wanted = tools.len().max(1) * most;
-        Self {
-            found: Vec::with_capacity(
-                in_ball
-                    .saturating_mul(axis_sample_counts(body, tools).max().unwrap_or_default())
-                    .min(body.partition.particle_count()),
-            ),
-            is_found: vec![false; body.partition.particle_count()],
-            load_claims,
-            nearest: NearestParticles::with_room(body.partition.particle_count()),
-            wanted: Vec::with_capacity(most_wanted),
-            unwanted: Vec::with_capacity(most),
-            crushed_cells: CrushedCells::new(body),
-            moved: Vec::with_capacity(most),
-            impulses: Vec::with_capacity(body.node_count() + most),
-            transferred_n: Vec::with_capacity(body.node_count()),
-            projection: Projection::with_room(body, most),
-            were_m: Vec::with_capacity(body.node_count()),
-            shifts_m: Vec::with_capacity(body.node_count()),
-            left: Vec::with_capacity(most),
-            weights_kg: Vec::with_capacity(body.node_count()),
-        }
-    }
-}
-
 impl SteppedHybrid<'_> {
     /// Prepares a tick: makes the patch that of the state's active particles, and every few ticks queries which should
     /// be active, and switches to them. Allocates nothing.
@@ -246,7 +178,7 @@ impl HybridScratch {
     ) {
         let Self { patch, query, .. } = self;
         patch.displace(body, &state.x);
-        update_balls(environment, &mut SkinView::new(body, patch), body, own, state);
+        update_balls(environment, &mut SkinView::new(body, patch), body, own, &mut query.nearest_before, state);
         let acting = Acting { load_factors: &state.load_factors, points };
         query.want(environment, body, own, reach_m, acting, 0);
         // What has no room any more may be far off itself.

@@ -6,7 +6,7 @@ use super::{
     state::{About, ActivationQuery, Found},
 };
 use crate::{
-    contact::{Near, Skin, ToolState},
+    contact::{Known, Near, Skin, ToolState},
     tick::{Environment, ListedVertices, MechanicalState, PointForce},
 };
 use glam::DVec3;
@@ -148,7 +148,7 @@ impl MassSpringScratch {
         ticks: u32,
     ) {
         let MechanicalState { x, tools, contact, force_is_current, .. } = state;
-        let fitted = force_is_current.then(|| contact.boxes());
+        let known = Known { fitted: force_is_current.then(|| contact.boxes()), vertex: None };
         let tick_period_s = environment.settings.tick_period_s;
         let MassSpringState { motion, about, .. } = own;
         let mut skin = SpringSkin::new(body, motion, &self.springs, x);
@@ -163,7 +163,7 @@ impl MassSpringScratch {
                 let ahead_m = f64::from(QUERY_EVERY_TICKS) * tick_period_s * sample.speed_m_per_s;
                 let near_m = GAP * spec.radius_m + 0.5 * body.edge_m() + ahead_m;
                 let cover_m = environment.contact.covering_radius_m;
-                let Near { from_m, vertex, gap_m } = sample.look(&skin, (near_m, cover_m), fitted);
+                let Near { from_m, vertex, gap_m } = sample.look(&skin, (near_m, cover_m), known);
                 let near = vertex.map(|(vertex, _)| {
                     let distance_m = |vertex: u32| skin.position_m(vertex).distance(from_m);
                     let vertex = skin.coarse_vertex(vertex, from_m);
