@@ -8,6 +8,7 @@ Examples:
   palpated                                  serve the built-in heart, pressed by a simulated arm
   palpated serve my-organ.toml              serve your own scene
   palpated check my-organ.toml              what the body is like, and how long a tick takes here
+  palpated fit-budget my-organ.toml         choose what its body has particles and tets for, by what a tick may take
   palpated simulate ventricle --out run     run headless: probes as CSV, frames as VTU, a JSON summary
   palpated static cantilever --out rest     find the equilibrium instead of integrating in time
   palpated schema > palpate-scene.json      JSON schema of scene files, for editors
@@ -37,6 +38,8 @@ enum Command {
     Static(offline::equilibrium::StaticArgs),
     /// Load a scene and say what its body is like and what a tick costs
     Check(offline::check::CheckArgs),
+    /// Choose the particles' spacing, how many may be awake and the coarse tets by what a tick may take here
+    FitBudget(offline::fit_budget::FitBudgetArgs),
     /// Find spring constants over displacement for a scene's refined mass-spring surface, and keep them beside it
     Calibrate(offline::calibrate::CalibrateArgs),
     /// Print the JSON schema of scene files
@@ -67,6 +70,7 @@ impl Cli {
             Some(Command::Simulate(args)) => offline::simulate::run(&args),
             Some(Command::Static(args)) => offline::equilibrium::run(&args),
             Some(Command::Check(args)) => offline::check::run(&args),
+            Some(Command::FitBudget(args)) => offline::fit_budget::run(&args),
             Some(Command::Calibrate(args)) => offline::calibrate::run(&args),
             Some(Command::Schema) => offline::schema::run(),
         }

@@ -264,7 +264,8 @@ fn particles_that_cannot_be_are_told_at_their_key() {
         (
             "",
             "",
-            "t.toml:6:7: [body.particles] lacks the key `spacing_m` (or `spacing_mm`) (docs/scenes.md describes every key)",
+            "t.toml:6:7: [body.particles] lacks the key `spacing_m` (or `spacing_mm`) (docs/scenes.md describes every key; \
+             of a body with particles `palpated fit-budget` chooses it, by what a tick may take)",
         ),
     ];
     for (spacing, more, wanted) in cases {

@@ -21,15 +21,23 @@ use palpate_physics::{
 use palpate_scene::Scene;
 use std::sync::Arc;
 
-/// A light touch of a tool where it is nearest to a body at rest.
+/// Where a tool touches a body at rest first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FirstTouch {
-    /// A little above the skin.
-    pub above: ToolTarget,
-    /// In it.
-    pub pressed: ToolTarget,
-    /// How deep (m) that is.
-    pub depth_m: f64,
+    /// The tool as it just touches the skin.
+    pub touching: ToolTarget,
+    /// Outward unit normal of the skin there.
+    pub outward: DVec3,
+    /// Radius (m) of the tool.
+    pub radius_m: f64,
+}
+
+impl FirstTouch {
+    /// Returns the tool as many of its radii above the skin, or in it where that is less than 0, and aside by this (m).
+    pub fn at(&self, radii_above: f64, aside_m: DVec3) -> ToolTarget {
+        let position_m = self.touching.position_m + self.outward * (radii_above * self.radius_m) + aside_m;
+        ToolTarget { position_m, ..self.touching }
+    }
 }
 
 /// What the daemon asks of a kind of body.

@@ -77,7 +77,7 @@ fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<Ti
 fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
     let Some(touch) = served(model).first_touch(scene) else { return Ok(None) };
     let mut run = Run::new(scene, model)?;
-    run.touch(&touch);
+    let depth_m = run.touch(&touch);
     let started = Instant::now();
     let is_enough = |ticks: u64, passed: Duration| passed >= PATIENCE || (passed >= BUDGET && ticks >= ENOUGH_TICKS);
     while !is_enough(run.state.mechanical.tick, started.elapsed()) {
@@ -85,5 +85,5 @@ fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
         run.refuse_quarantined()?;
     }
     let (tick_wall_us, ticks, most) = run.cost_awake();
-    Ok((ticks > 0).then_some(AwakeCost { tick_wall_us, ticks, most, touched_m: Some(touch.depth_m) }))
+    Ok((ticks > 0).then_some(AwakeCost { tick_wall_us, ticks, most, touched_m: Some(depth_m) }))
 }

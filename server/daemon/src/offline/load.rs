@@ -59,7 +59,17 @@ pub(super) fn build(scene: &Scene) -> miette::Result<Model> {
 
 fn build_or_advise(scene: &Scene, help: Option<&'static str>) -> miette::Result<Model> {
     let mut bar = Progress::new(&scene.name);
-    let model = Model::build_with(scene.model.clone(), &mut |part| bar.show(part, BUILDING));
+    let model = build_showing(scene, help, &mut |part| bar.show(part, BUILDING));
     bar.finish();
+    model
+}
+
+/// Builds the model of a scene; `progress` is told which part of it is done.
+pub(super) fn build_showing(
+    scene: &Scene,
+    help: Option<&'static str>,
+    progress: &mut dyn FnMut(f64),
+) -> miette::Result<Model> {
+    let model = Model::build_with(scene.model.clone(), progress);
     model.map_err(|cause| Refused { scene: scene.name.clone(), help, cause }.into())
 }

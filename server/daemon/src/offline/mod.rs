@@ -1,4 +1,4 @@
-//! Commands that run without a network: `simulate`, `static`, `check`, `schema`. They run the same scenes and the same
+//! Commands that run without a network: `simulate`, `static`, `check`, `fit-budget`, `schema`. They run the same scenes and the same
 //! physics as `serve`; nothing in them is random, so equal scenes give equal results, bit for bit.
 mod args;
 pub mod calibrate;
@@ -8,6 +8,7 @@ mod check_tools;
 mod cost;
 pub mod equilibrium;
 mod exit;
+pub mod fit_budget;
 mod folder;
 mod frames;
 mod interrupt;

@@ -335,10 +335,25 @@ impl<'s> Run<'s> {
         })
     }
 
-    /// Puts the first tool above the body; from there it goes to a touch, and stays, whatever its driver says.
-    pub(super) fn touch(&mut self, touch: &FirstTouch) {
-        self.state.place_tool(0, touch.above);
-        self.first_tool = Some(touch.pressed);
+    /// Puts the first tool above the body, from where it goes to a light touch and stays. Returns how deep (m) that is.
+    pub(super) fn touch(&mut self, touch: &FirstTouch) -> f64 {
+        /// In radii of the tool.
+        const DEPTH: f64 = 0.1;
+        self.start_above(touch);
+        self.send_first_tool(touch.at(-DEPTH, DVec3::ZERO));
+        DEPTH * touch.radius_m
+    }
+
+    /// Puts the first tool above where it touches the body first.
+    pub(super) fn start_above(&mut self, touch: &FirstTouch) {
+        /// Height above the skin, in radii of the tool.
+        const ABOVE: f64 = 0.5;
+        self.state.place_tool(0, touch.at(ABOVE, DVec3::ZERO));
+    }
+
+    /// From now on the first tool goes there, whatever its driver says.
+    pub(super) fn send_first_tool(&mut self, target: ToolTarget) {
+        self.first_tool = Some(target);
     }
 
     /// What the ticks cost.

@@ -181,7 +181,7 @@ mod tests {
             let cloud = Cloud { ids: (0..at_m.len() as u32).collect(), at_m };
             let count = spec.axis_sample_count(apart_m);
             let samples = tool.axis_samples(&spec, count);
-            let looks: Vec<Near> = 
+            let looks: Vec<Near> =
                 samples.map(|sample| sample.look(&cloud, (near_m, cover_m), Known::default())).collect();
             // Whatever vertex is told to be near, the same are found.
             for vertex in 0..cloud.at_m.len() as u32 {

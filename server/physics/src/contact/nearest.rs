@@ -15,12 +15,7 @@ pub(crate) struct Known<'a> {
 
 /// Returns the vertex nearest to a point, if one is within a distance (m), and its distance (m), on a skin of which a
 /// query has begun; of several that are as near, the first one.
-pub(crate) fn nearest_vertex(
-    skin: &impl Skin,
-    from_m: DVec3,
-    within_m: f64,
-    known: Known<'_>,
-) -> Option<(u32, f64)> {
+pub(crate) fn nearest_vertex(skin: &impl Skin, from_m: DVec3, within_m: f64, known: Known<'_>) -> Option<(u32, f64)> {
     let of_fitted_m = |cluster: usize| {
         known.fitted.map_or(0.0, |fitted| fitted.boxes[cluster].distance_bound_m(from_m, fitted.travel_m))
     };

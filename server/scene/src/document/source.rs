@@ -280,7 +280,13 @@ fn document_fault(at: Where, message: &str) -> Fault {
         }
         Some((key, _)) if message.starts_with("missing field") => {
             let length = if key.ends_with("_m") { format!(" (or `{key}m`)") } else { String::new() };
-            fault(at, format!("{table} lacks the key `{key}`{length}")).help("docs/scenes.md describes every key")
+            let chosen = if ["spacing_m", "target_tets"].contains(key) {
+                "; of a body with particles `palpated fit-budget` chooses it, by what a tick may take"
+            } else {
+                ""
+            };
+            let help = format!("docs/scenes.md describes every key{chosen}");
+            fault(at, format!("{table} lacks the key `{key}`{length}")).help(help)
         }
         _ if message == "invalid type: map, expected a sequence" => {
             fault(at.clone(), format!("{at} is a table, and should be a list of them")).help(format!("write [[{at}]]"))

@@ -7,11 +7,6 @@ use palpate_physics::{
 };
 use palpate_scene::Scene;
 
-/// Depth, in radii of the tool, of a light touch.
-const DEPTH: f64 = 0.1;
-/// Height above the skin, in radii, from which the tool comes down.
-const ABOVE: f64 = 0.5;
-
 /// Returns the touch of the first tool where it is nearest to particles that may wake; `None` where it wakes none.
 pub(super) fn first_touch(hybrid: &HybridBody, scene: &Scene) -> Option<FirstTouch> {
     let Waking::ByTools { .. } = hybrid.particles().waking else { return None };
@@ -27,11 +22,9 @@ pub(super) fn first_touch(hybrid: &HybridBody, scene: &Scene) -> Option<FirstTou
         ToolShape::Sphere => 0.0,
         ToolShape::Capsule(capsule) => capsule.half_length_m * (turn * DVec3::Z).dot(outward).abs(),
     };
-    let at = |height: f64| {
-        let position_m = vertex_m + outward * (tool.radius_m * (1.0 + height) + half_m);
-        ToolTarget { orientation: turn, ..ToolTarget::at(position_m) }
-    };
-    Some(FirstTouch { above: at(ABOVE), pressed: at(-DEPTH), depth_m: DEPTH * tool.radius_m })
+    let position_m = vertex_m + outward * (tool.radius_m + half_m);
+    let touching = ToolTarget { orientation: turn, ..ToolTarget::at(position_m) };
+    Some(FirstTouch { touching, outward, radius_m: tool.radius_m })
 }
 
 /// Returns the nearest of these points (m) to another, and its number; `None` where there is none.

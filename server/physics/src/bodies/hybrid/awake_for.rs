@@ -1,5 +1,10 @@
 //! What awake particles are awake for: worked out anew when it is asked for, by the claims of now.
-use super::{activation_query::Acting, body::HybridBody, spec::Waking, state::HybridState, switching::ActivationQuery};
+use super::{
+    activation_query::{Acting, ActivationQuery},
+    body::HybridBody,
+    spec::Waking,
+    state::HybridState,
+};
 use crate::tick::{AwakeFor, Environment, PointForce};
 use std::collections::BTreeSet;
 

@@ -1,5 +1,6 @@
 //! The buffers that a hybrid body's ticks work in.
 use super::{
+    activation_query::ActivationQuery,
     body::HybridBody,
     carried_skin::Carried,
     long_steps::LongStepHistory,
@@ -8,7 +9,6 @@ use super::{
     staged_patch::StagedPatch,
     state::{HybridState, room_for_cells},
     state_transfer::Before,
-    switching::ActivationQuery,
     transition_force::TransitionForce,
 };
 use crate::tick::{Environment, ListedVertices};

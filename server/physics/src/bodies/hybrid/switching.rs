@@ -19,18 +19,15 @@
 //! then (`projection`), for which `−Σ_i Δ_i × P_i`, with the momenta `P = M'' v + J`, is added to the couple on the
 //! right.
 use super::{
-    activation_query::{Acting, begins_to_act, meets_sleeping_skin, moves_quickly, update_balls},
+    activation_query::{Acting, ActivationQuery, begins_to_act, meets_sleeping_skin, moves_quickly, update_balls},
     body::HybridBody,
     carried_skin::SkinView,
-    crushed_cells::CrushedCells,
-    load_claims::{LoadClaims, NearestParticles},
     patch::KEPT,
-    projection::Projection,
     running::RunningMassMatrix,
     running::RunningPatch,
     scratch::HybridScratch,
     spec::Waking,
-    state::{HybridState, axis_sample_counts},
+    state::HybridState,
     state_transfer::{NodeShifts, PatchSwitch},
     stepped::SteppedHybrid,
     transition_force::{Turn, turn_of},
