@@ -203,10 +203,21 @@ fn the_file_of_a_module_with_a_folder_is_in_the_folder() {
     assert!(strangers.is_empty(), "these belong into their folders as mod.rs: {strangers:?}");
 }
 
+/// LLVM 22 compiles plain arithmetic of the physics wrongly where it packs it into vectors (`docs/adr/no-slp.md`). Tests of physics see that in the build
+/// that they are of, and in no other.
+#[test]
+fn plain_arithmetic_is_not_packed_into_vectors() {
+    let config: toml::Table = fs::read_to_string(root().join(".cargo/config.toml")).unwrap().parse().unwrap();
+    let flags = config["build"]["rustflags"].as_array().unwrap();
+    let words: Vec<&str> = flags.iter().filter_map(toml::Value::as_str).collect();
+    assert!(words.windows(2).any(|pair| pair == ["-C", "no-vectorize-slp"]), "{words:?}");
+}
+
 /// The top level is given: nothing else is committed there.
 #[test]
 fn the_top_level_holds_only_what_belongs_there() {
     let allowed = [
+        ".cargo",
         ".ci",
         ".gitattributes",
         ".gitignore",

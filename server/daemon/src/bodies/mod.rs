@@ -76,6 +76,11 @@ pub trait ServedBody {
         None
     }
 
+    /// The part of its volume that is in whole cells of a lattice, 1 for a body without one: little is a lattice that hardly sees the body.
+    fn part_in_whole_cells(&self) -> f64 {
+        1.0
+    }
+
     /// Whether a scene may give it any law of material.
     fn takes_any_law(&self) -> bool {
         true

@@ -48,6 +48,10 @@ impl ServedBody for HybridBody {
         matches!(self.particles().waking, Waking::ByTools { .. })
     }
 
+    fn part_in_whole_cells(&self) -> f64 {
+        self.partition().whole_part()
+    }
+
     fn first_touch(&self, scene: &Scene) -> Option<FirstTouch> {
         touch::first_touch(self, scene)
     }

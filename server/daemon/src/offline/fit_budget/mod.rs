@@ -182,7 +182,7 @@ impl Search<'_> {
             let factor = FINER.powi(finer as i32);
             let spacing_m = if said_m.is_some() { from_m } else { two_significant(from_m * factor) };
             let trial = self.trial(&Numbers { spacing_m, most_active, target_tets })?;
-            let whole = trial.hybrid().map_or(1.0, |body| body.partition().whole_part());
+            let whole = trial.part_in_whole_cells();
             if said_m.is_some() || whole >= FEW_WHOLE || finer == MOST_FINER {
                 return Ok((spacing_m, trial));
             }
@@ -203,8 +203,7 @@ impl Search<'_> {
     /// Presses the body with these numbers; with it the number of its coarse tets is returned.
     fn press(&mut self, numbers: &Numbers) -> miette::Result<(usize, Pressed)> {
         let trial = self.trial(numbers)?;
-        let coarse_tets = trial.hybrid().map_or(0, |body| body.coarse().tets().len());
-        Ok((coarse_tets, trial.press()?))
+        Ok((trial.coarse_tets(), trial.press()?))
     }
 }
 

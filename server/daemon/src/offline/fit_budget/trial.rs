@@ -6,7 +6,7 @@ use super::{
 use crate::bodies::{FirstTouch, served};
 use glam::DVec3;
 use miette::Report;
-use palpate_physics::{Body, Model, bodies::hybrid::HybridBody};
+use palpate_physics::Model;
 use palpate_scene::{Limits, Scene, parse};
 use std::path::Path;
 
@@ -66,12 +66,14 @@ impl Trial {
         Ok(Self { scene, model, touch })
     }
 
-    /// The body with particles.
-    pub(super) fn hybrid(&self) -> Option<&HybridBody> {
-        match self.model.body() {
-            Body::Hybrid(body) => Some(body),
-            _ => None,
-        }
+    /// The part of the body's volume that is in whole cells of the lattice.
+    pub(super) fn part_in_whole_cells(&self) -> f64 {
+        served(&self.model).part_in_whole_cells()
+    }
+
+    /// Number of the body's coarse tets.
+    pub(super) fn coarse_tets(&self) -> usize {
+        self.model.body().tets().map_or(0, |mesh| mesh.tets().len())
     }
 
     /// Presses and drags the first tool.
