@@ -110,6 +110,9 @@ fn what_cannot_be_chosen_is_told_and_nothing_is_written() {
     let without_tool = SCENE.split_once("[[tool]]").unwrap().0;
     refused(without_tool, &[], "has no [[tool]] with a radius_mm or radius_m");
     refused(&SCENE.replace("poisson_ratio = 0.3", "poisson_ratio = 0.7"), &[], "poisson_ratio");
+    refused(&SCENE.replace("= 60", "= -60"), &[], "most_active is there, and is not a number that can be used");
+    let twice = SCENE.replace("most_active = 60", "spacing_m = 0.004\nspacing_mm = 4");
+    refused(&twice, &[], "spacing_m");
     refused(&SCENE.replace("[scene]", "[scene"), &[], "is not TOML");
     let missing = fit(Path::new("no/such/scene.toml"), &[]);
     assert!(missing.code == Some(1) && missing.said.contains("cannot read no/such/scene.toml"), "{}", missing.said);

@@ -166,9 +166,7 @@ impl Search<'_> {
         let (tool, radius_m) = (tool.name.clone(), tool.radius_m);
         Ok(Found { tool, radius_m, period_us, budget_us, particles, reference_awake, fitting })
     }
-}
 
-impl Search<'_> {
     /// Returns the spacing (m), and the body with particles so far apart.
     fn spacing(&mut self, target_tets: Option<u32>, most_active: u32) -> miette::Result<(f64, Trial)> {
         let said_m = self.text.said.spacing_m;
@@ -181,7 +179,9 @@ impl Search<'_> {
         loop {
             let factor = FINER.powi(finer as i32);
             let spacing_m = if said_m.is_some() { from_m } else { two_significant(from_m * factor) };
-            let trial = self.trial(&Numbers { spacing_m, most_active, target_tets })?;
+            // What the scene says itself is read as it stands there.
+            let numbers = Numbers { spacing_m, most_active, target_tets };
+            let trial = self.trial(&numbers, &self.text.with_chosen(&numbers))?;
             let whole = trial.part_in_whole_cells();
             if said_m.is_some() || whole >= FEW_WHOLE || finer == MOST_FINER {
                 return Ok((spacing_m, trial));
@@ -190,19 +190,19 @@ impl Search<'_> {
         }
     }
 
-    fn trial(&mut self, numbers: &Numbers) -> miette::Result<Trial> {
+    fn trial(&mut self, numbers: &Numbers, text: &str) -> miette::Result<Trial> {
         if self.interrupt.is_set() {
             return Err(miette::miette!("interrupted; {} is as it was", self.path.display()));
         }
         let tets = numbers.target_tets.map_or(String::new(), |tets| format!("{tets} coarse tets, "));
         let spacing = short(numbers.spacing_m * 1e3);
         self.bar.show_work(&format!("{tets}particles {spacing} mm apart, up to {} awake", numbers.most_active));
-        Trial::new(self.path, self.text, numbers)
+        Trial::new(self.path, text)
     }
 
     /// Presses the body with these numbers; with it the number of its coarse tets is returned.
     fn press(&mut self, numbers: &Numbers) -> miette::Result<(usize, Pressed)> {
-        let trial = self.trial(numbers)?;
+        let trial = self.trial(numbers, &self.text.with_all(numbers))?;
         Ok((trial.coarse_tets(), trial.press()?))
     }
 }
@@ -239,7 +239,7 @@ impl Found {
         say(format_args!("particles  {}, {} mm apart", self.particles, millimetres(spacing_m)));
         say(format_args!(
             "           its forces beside those with {} awake, on the same way:",
-            if self.reference_awake == self.particles { "all" } else { "20000" }
+            if self.reference_awake == self.particles { "all".to_owned() } else { self.reference_awake.to_string() }
         ));
         say(format_args!("coarse tets    awake    tick p50 (us)    p99 (us)    stronger    off in all"));
         for (fitting, off) in &self.fitting {

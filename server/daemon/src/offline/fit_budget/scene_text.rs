@@ -30,6 +30,10 @@ pub(super) enum TextError {
     #[error("{name} has no [[tool]] with a radius_mm or radius_m, whose size the particles' spacing follows")]
     #[diagnostic(help("add the tool that is to touch the body, or write spacing_mm in [body.particles]"))]
     NoTool { name: String },
+    /// What is there is no number that could be kept.
+    #[error("{name}: {key} is there, and is not a number that can be used")]
+    #[diagnostic(help("correct it, or leave it out to have it chosen"))]
+    NotANumber { name: String, key: String },
     /// All three are there.
     #[error("{name} leaves nothing to be chosen: it says spacing, most_active and target_tets itself")]
     #[diagnostic(help("leave out those that are to be chosen, or add --again to choose all of them anew"))]
@@ -84,13 +88,19 @@ impl SceneText {
             return Err(TextError::NoParticles { name: name() });
         };
         let filled = FILLED.into_iter().find(|table| body.contains_key(table));
-        let tets = filled.and_then(|table| whole(body.get(table)?.as_table_like()?, "target_tets"));
-        let written = Said {
-            spacing_m: length_m(particles, "spacing"),
-            most_active: whole(particles, "most_active"),
-            target_tets: tets,
+        let tets = match filled.and_then(|table| body.get(table)?.as_table_like()) {
+            Some(table) => whole(table, "target_tets"),
+            None => Ok(None),
         };
-        let all = written.spacing_m.is_some() && written.most_active.is_some() && (filled.is_none() || tets.is_some());
+        let unusable = |key: String| TextError::NotANumber { name: name(), key };
+        let written = Said {
+            spacing_m: length_m(particles, "spacing").map_err(unusable)?,
+            most_active: whole(particles, "most_active").map_err(unusable)?,
+            target_tets: tets.map_err(unusable)?,
+        };
+        let all = written.spacing_m.is_some()
+            && written.most_active.is_some()
+            && (filled.is_none() || written.target_tets.is_some());
         if all && !again {
             return Err(TextError::NothingLeftOut { name: name() });
         }
@@ -110,7 +120,7 @@ impl SceneText {
             Some(tables) => tables.get(0).map(|table| table as &dyn TableLike),
             None => tools.as_array()?.get(0)?.as_inline_table().map(|table| table as &dyn TableLike),
         };
-        length_m(first?, "radius").filter(|radius_m| *radius_m > 0.0 && radius_m.is_finite())
+        length_m(first?, "radius").ok()?.filter(|radius_m| *radius_m > 0.0 && radius_m.is_finite())
     }
 
     /// Returns the text with these numbers in place of all that it says of them.
@@ -165,15 +175,23 @@ fn put(table: &mut Item, key: &str, value: Value) {
     }
 }
 
-/// A length (m) that is given in metres or millimetres.
-fn length_m(table: &dyn TableLike, key: &str) -> Option<f64> {
+/// A length (m) that is given in metres or millimetres; the key where it is no number.
+fn length_m(table: &dyn TableLike, key: &str) -> Result<Option<f64>, String> {
     let real = |item: &Item| item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64));
-    let metres = table.get(&format!("{key}_m")).and_then(real);
-    metres.or_else(|| Some(real(table.get(&format!("{key}_mm"))?)? * 1e-3))
+    for (unit, unit_m) in [("_m", 1.0), ("_mm", 1e-3)] {
+        let key = format!("{key}{unit}");
+        if let Some(item) = table.get(&key) {
+            return real(item).map(|value| Some(value * unit_m)).ok_or(key);
+        }
+    }
+    Ok(None)
 }
 
-fn whole(table: &dyn TableLike, key: &str) -> Option<u32> {
-    table.get(key)?.as_integer()?.try_into().ok()
+/// A whole number, not negative; the key where it is none.
+fn whole(table: &dyn TableLike, key: &str) -> Result<Option<u32>, String> {
+    let Some(item) = table.get(key) else { return Ok(None) };
+    let value = item.as_integer().and_then(|whole| whole.try_into().ok());
+    value.map(Some).ok_or_else(|| key.to_owned())
 }
 
 #[cfg(test)]
@@ -222,6 +240,10 @@ mod tests {
         let shown = |text: &str| read(text, false).unwrap_err().to_string();
         assert!(shown("[body").starts_with("heart.toml is not TOML: "));
         assert_eq!(shown(&SCENE.replace("[body.particles]", "[body.springs]")), "heart.toml has no [body.particles]");
+        for (key, value) in [("spacing_mm", "\"four\""), ("most_active", "-5"), ("most_active", "2.5")] {
+            let wrong = SCENE.replace("smooth_skin = true", &format!("{key} = {value}"));
+            assert_eq!(shown(&wrong), format!("heart.toml: {key} is there, and is not a number that can be used"));
+        }
         for without in [SCENE.replace("[[tool]]\nradius_mm = 8\n", ""), SCENE.replace("radius_mm = 8", "radius_mm = 0")]
         {
             assert_eq!(read(&without, false).unwrap().tool_radius_m(), None);

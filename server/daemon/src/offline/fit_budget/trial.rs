@@ -1,8 +1,5 @@
 //! One choice of numbers, tried: the first tool presses the body where it is nearest to it, and is dragged.
-use super::{
-    super::{load, simulate::Run, summary::Percentiles},
-    scene_text::{Numbers, SceneText},
-};
+use super::super::{load, simulate::Run, summary::Percentiles};
 use crate::bodies::{FirstTouch, served};
 use glam::DVec3;
 use miette::Report;
@@ -47,15 +44,14 @@ pub(super) struct Off {
 }
 
 impl Trial {
-    /// Loads the scene with these numbers, and builds its body.
+    /// Loads a scene's text with numbers in it, and builds its body.
     ///
     /// # Errors
     /// A scene that is refused, or a body that no tool of the scene wakes particles of.
-    pub(super) fn new(path: &Path, text: &SceneText, numbers: &Numbers) -> miette::Result<Self> {
+    pub(super) fn new(path: &Path, text: &str) -> miette::Result<Self> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let name = path.display().to_string();
-        let scene = parse(&text.with_all(numbers), &name, Some(folder), &Limits::local(), &mut |_, _| ())
-            .map_err(Report::new)?;
+        let scene = parse(text, &name, Some(folder), &Limits::local(), &mut |_, _| ()).map_err(Report::new)?;
         let model = load::build_showing(&scene, None, &mut |_| ())?;
         let touch = served(&model).first_touch(&scene).ok_or_else(|| {
             miette::miette!(
