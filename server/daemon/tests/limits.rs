@@ -259,3 +259,32 @@ fn a_summary_tells_what_particles_are_awake_for() {
     let ([both, rest, ..], _) = active(&format!("{load}{}", tool.replace("32, 32", "8, 8")));
     assert!(both > 20 && rest < loads, "{both} {rest}");
 }
+
+/// Pressed as deep, a body of Poisson's ratio 0.499 answers nearly the same whether its waves of volume are slowed or not, and takes at most twice as many
+/// substeps as one of 0.45 where they are.
+#[test]
+fn a_body_that_keeps_its_volume_is_as_stiff_with_slower_waves_of_volume() {
+    let tool = "[[tool]]\nname = \"ball\"\nradius_mm = 8\ncoupling = \"rigid\"\ndriver = \"script\"\n\
+                keyframe = [{ time_s = 0, position_mm = [20, 20, 28.5] }, { time_s = 0.1, position_mm = [20, 20, 26] }]\n\
+                [[probe]]\nname = \"force\"\nmeasure = \"contact-force\"\ntool = \"ball\"\n[numerics]\nmass_damping_per_s = 60\n";
+    let held = format!("[[fixed]]\nregion = \"z_min\"\n{tool}");
+    let scene = lattice(2.5, &held, "[body.box]\nsize_mm = [40, 40, 20]\ncells = [4, 4, 2]")
+        .replace("duration_s = 0.02", "duration_s = 0.25");
+    let pressed = |nu: &str, most: &str| {
+        let scene =
+            scene.replace("poisson_ratio = 0.3", &format!("poisson_ratio = {nu}")).replace("spacing_mm = 2.5", most);
+        let ended = run("simulate", &scene, &["--json"]);
+        assert_eq!(ended.code, Some(0), "{}", ended.said);
+        let told = json(&ended);
+        let number = |value: &Value| value.as_f64().unwrap();
+        let force_n = number(&told["probes"]["force"]["values"]["z"]);
+        let warned = ended.said.contains("has Poisson's ratio");
+        (force_n, number(&told["time"]["substeps_per_tick"]), warned)
+    };
+    let (usual, slowed) = (pressed("0.45", "spacing_mm = 2.5"), pressed("0.499", "spacing_mm = 2.5"));
+    let exact = pressed("0.499", "spacing_mm = 2.5\nmost_poisson_ratio = 0.5");
+    println!("{usual:?} {slowed:?} {exact:?}");
+    assert!((slowed.0 / exact.0 - 1.0).abs() < 0.03, "{slowed:?} {exact:?}");
+    assert!(slowed.1 <= 2.0 * usual.1 && exact.1 > 2.0 * slowed.1, "{usual:?} {slowed:?} {exact:?}");
+    assert_eq!([usual.2, slowed.2, exact.2], [false, true, false]);
+}

@@ -81,6 +81,23 @@ impl Lame {
         self.lambda_pa / (2.0 * (self.lambda_pa + self.mu_pa))
     }
 
+    /// Returns constants whose Poisson's ratio is at most `ν'`, and which are as stiff beneath a tool: where `ν > ν'`,
+    /// ```text
+    /// µ' = µ (1 − ν')/(1 − ν),   λ' = 2µ'ν'/(1 − 2ν')
+    /// ```
+    /// keep `E/(1 − ν²) = 2µ/(1 − ν)`, by which a half-space resists indentation (Hertz 1882). In shear a body is then
+    /// `(ν − ν')/(1 − ν)` stiffer, 2 % from 0.499 to 0.488, where waves of volume are four times as slow. Smaller ratios
+    /// stay as they are.
+    #[must_use]
+    pub fn with_poisson_ratio_up_to(self, most: f64) -> Self {
+        let nu = self.poisson_ratio();
+        if nu <= most {
+            return self;
+        }
+        let mu_pa = self.mu_pa * (1.0 - most) / (1.0 - nu);
+        Self { lambda_pa: 2.0 * mu_pa * most / (1.0 - 2.0 * most), mu_pa }
+    }
+
     /// P-wave modulus `λ + 2µ` (Pa); the wave speed is √(M/ρ).
     pub fn p_wave_modulus_pa(self) -> f64 {
         self.lambda_pa + 2.0 * self.mu_pa
@@ -149,5 +166,22 @@ mod tests {
         assert!(Lame::new(-1.0, 1.0).is_err());
         assert!(Viscosity::new(-1.0, 0.0).is_err());
         assert!(checked_density(-1.0).is_err());
+    }
+
+    #[test]
+    fn a_smaller_poisson_ratio_leaves_the_stiffness_beneath_a_tool() {
+        let hertz_pa = |lame: Lame| lame.young_modulus_pa() / (1.0 - lame.poisson_ratio().powi(2));
+        for nu in [-0.3, 0.3, 0.45, 0.488, 0.49, 0.499, 0.4999] {
+            let lame = Lame::from_young_poisson(10e3, nu).unwrap();
+            let limited = lame.with_poisson_ratio_up_to(0.488);
+            assert!((hertz_pa(limited) / hertz_pa(lame) - 1.0).abs() < 1e-12);
+            if nu <= 0.488 {
+                assert_eq!(limited, lame);
+            } else {
+                assert!((limited.poisson_ratio() - 0.488).abs() < 1e-12);
+                assert!((limited.mu_pa / lame.mu_pa - 1.0 - (nu - 0.488) / (1.0 - nu)).abs() < 1e-12);
+            }
+            assert_eq!(lame.with_poisson_ratio_up_to(0.5), lame);
+        }
     }
 }

@@ -62,6 +62,7 @@ pub(crate) fn compile(
     let ingredients =
         Ingredients { document, body: &body, materials, constraints: &constraints, tools: &tools.specs, files };
     let compiled = body.kind.compile(ingredients, &mut settings)?;
+    warnings.extend_from_slice(&compiled.warnings);
     warnings.extend(tools.warnings);
     warnings.extend(body.kind.warnings(&body, &tools.specs));
     let probes = probes::compile(&document.probe, &regions, &body, &tools.specs, &constraints, &mut warnings)?;

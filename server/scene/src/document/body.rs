@@ -67,6 +67,14 @@ pub(crate) struct ParticlesTable {
     /// Particles within this distance (m, at rest) of where a tool touches the skin are awake; by default the radius of the half ball
     /// that holds `most_active` of them.
     pub(crate) reach_m: Option<f64>,
+    /// Materials whose Poisson's ratio is larger, up to 0.5, are taken to have this one, and to be as stiff beneath a tool; waves of volume
+    /// are slower then, and a tick takes fewer substeps. 0.5 leaves all as they are.
+    #[serde(default = "default_most_poisson_ratio")]
+    pub(crate) most_poisson_ratio: f64,
+}
+
+fn default_most_poisson_ratio() -> f64 {
+    0.488
 }
 
 fn default_most_active() -> u32 {

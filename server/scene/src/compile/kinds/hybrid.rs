@@ -17,10 +17,11 @@ use crate::{
     limits::Limits,
     shapes::{self, ShapeError},
     skin::{FineSurface, refine},
+    wording::short,
 };
 use glam::DVec3;
 use palpate_physics::{
-    BodySpec, Settings, TetMesh,
+    BodySpec, Region, Settings, TetMesh,
     bodies::hybrid::{HybridSpec, ParticleSpec, Skin, Waking, composite::Composite, spec::MOST_ACTIVE},
     contact::{ToolSpec, is_inside},
     mesh::tet::EDGES,
@@ -66,7 +67,7 @@ impl BodyKind for Hybrid {
     }
 
     fn compile(&self, ingredients: Ingredients<'_>, _: &mut Settings) -> Result<Compiled, Fault> {
-        let coarse = ingredients.solid()?;
+        let mut coarse = ingredients.solid()?;
         let Ingredients { document, body, constraints, files, .. } = ingredients;
         let (Some(table), Some(fine)) = (&document.body.particles, &body.skin) else {
             return Err(Fault::value(at(), "particles need a surface that encloses the body".to_owned()));
@@ -91,9 +92,10 @@ impl BodyKind for Hybrid {
                 None => Waking::in_half_ball(table.spacing_m, table.fine_depth_m, table.most_active as usize),
             },
         };
+        let warnings = limit_poisson_ratios(table, &mut coarse.regions)?;
         let volume_m3 = particles.skin.volume_m3();
         let mass_kg = mass_kg(&coarse, volume_m3);
-        Ok(Compiled { spec: BodySpec::Hybrid(HybridSpec { coarse, particles }), volume_m3, mass_kg })
+        Ok(Compiled { spec: BodySpec::Hybrid(HybridSpec { coarse, particles }), volume_m3, mass_kg, warnings })
     }
 
     fn locate(&self, body: &Body, point_m: DVec3) -> Located {
@@ -245,6 +247,27 @@ impl ParticlesTable {
     fn longest_edge_m(&self) -> f64 {
         self.skin_edge_m.unwrap_or(self.spacing_m)
     }
+}
+
+/// Lowers the Poisson's ratios that are larger than the scene allows, and tells of each.
+fn limit_poisson_ratios(table: &ParticlesTable, regions: &mut [Region]) -> Result<Vec<String>, Fault> {
+    let (key, most) = (at().key("most_poisson_ratio"), table.most_poisson_ratio);
+    check(&key, most, most > 0.0 && most <= 0.5, "must be larger than 0 and at most 0.5")?;
+    let limit = |region: &mut Region| {
+        let lame = region.material.lame;
+        region.material.lame = lame.with_poisson_ratio_up_to(most);
+        (lame != region.material.lame).then(|| {
+            format!(
+                "the material \"{}\" has Poisson's ratio {}; it is taken to have {}, and to be as stiff beneath a tool, as its waves of volume would ask for \
+                 many more substeps: most_poisson_ratio = 0.5 in [body.particles] leaves it as it is, and poisson_ratio = {} says what is taken",
+                region.name,
+                short(lame.poisson_ratio()),
+                short(most),
+                short(most)
+            )
+        })
+    };
+    Ok(regions.iter_mut().filter_map(limit).collect())
 }
 
 /// What bodies with particles cannot have, at its key.

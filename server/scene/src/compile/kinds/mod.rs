@@ -103,6 +103,8 @@ pub(super) struct Compiled {
     pub(super) spec: BodySpec,
     pub(super) volume_m3: f64,
     pub(super) mass_kg: f64,
+    /// What one would want to know of what was made of the document.
+    pub(super) warnings: Vec<String>,
 }
 
 /// Mass (kg) of a body whose surface encloses `volume_m3`, which its tets need not have.

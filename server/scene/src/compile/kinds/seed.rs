@@ -69,7 +69,12 @@ impl BodyKind for Seed {
         });
         let spec = SeedBodySpec { core, layer, parameters };
         let volume_m3 = spec.volume_m3(&body.surface);
-        Ok(Compiled { mass_kg: mass_kg(&spec.core, volume_m3), volume_m3, spec: BodySpec::Seed(spec) })
+        Ok(Compiled {
+            mass_kg: mass_kg(&spec.core, volume_m3),
+            volume_m3,
+            spec: BodySpec::Seed(spec),
+            warnings: Vec::new(),
+        })
     }
 
     /// In the core, or the nearest of the skin: nothing is known between them.

@@ -23,7 +23,7 @@ impl BodyKind for Tet {
             Some(ElementsName::Linear) => TetElements::Linear,
         };
         let mass_kg = mass_kg(&solid, volume_m3);
-        Ok(Compiled { mass_kg, volume_m3, spec: BodySpec::Tet(TetSpec { solid, elements }) })
+        Ok(Compiled { mass_kg, volume_m3, spec: BodySpec::Tet(TetSpec { solid, elements }), warnings: Vec::new() })
     }
 
     fn has_elements(&self) -> bool {

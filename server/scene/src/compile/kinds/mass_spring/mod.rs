@@ -75,7 +75,8 @@ impl BodyKind for MassSpring {
     fn compile(&self, ingredients: Ingredients<'_>, settings: &mut Settings) -> Result<Compiled, Fault> {
         let Ingredients { document, body, tools, files, .. } = ingredients;
         let spec = spec(document, body, tools, files, settings)?;
-        Ok(Compiled { mass_kg: spec.springs.mass_kg.iter().sum(), volume_m3: 0.0, spec: BodySpec::MassSpring(spec) })
+        let mass_kg = spec.springs.mass_kg.iter().sum();
+        Ok(Compiled { mass_kg, volume_m3: 0.0, spec: BodySpec::MassSpring(spec), warnings: Vec::new() })
     }
 
     /// On the surface refined everywhere: there is nothing inside.
