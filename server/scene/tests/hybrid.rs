@@ -258,6 +258,11 @@ fn particles_that_cannot_be_are_told_at_their_key() {
         ("spacing_mm = 1", "reach_mm = 0", "t.toml:8:12: body.particles.reach_m = 0: must be larger than 0"),
         (
             "spacing_mm = 1",
+            "most_poisson_ratio = 0.6",
+            "t.toml:8:22: body.particles.most_poisson_ratio = 0.6: must be larger than 0 and at most 0.5",
+        ),
+        (
+            "spacing_mm = 1",
             "spaceing = 2",
             "t.toml:8:1: unknown key `spaceing` in [body.particles] (did you mean `spacing_m` or `spacing_mm`?)",
         ),
@@ -278,6 +283,30 @@ fn particles_that_cannot_be_are_told_at_their_key() {
     ));
     let sleeping = format!("{}[numerics]\nsleep_tolerance_um = 1\n", small("spacing_mm = 1", ""));
     assert!((loaded(&sleeping).unwrap().model.settings.sleep_tolerance_m - 1e-6).abs() < 1e-20);
+}
+
+#[test]
+fn materials_that_keep_their_volume_are_limited_and_told() {
+    let scene = |nu: &str, more: &str| {
+        let text = small("spacing_mm = 1.25", more).replace("poisson_ratio = 0.3", &format!("poisson_ratio = {nu}"));
+        assert!(text.contains(&format!("poisson_ratio = {nu}")), "{text}");
+        loaded(&text).unwrap()
+    };
+    let ratio = |scene: &Scene| scene.model.body.solid().unwrap().regions[0].material.lame.poisson_ratio();
+    for (nu, more, taken) in [
+        ("0.488", "", 0.488),
+        ("0.499", "", 0.488),
+        ("0.499", "most_poisson_ratio = 0.5", 0.499),
+        ("0.4", "most_poisson_ratio = 0.3", 0.3),
+    ] {
+        let scene = scene(nu, more);
+        assert!((ratio(&scene) - taken).abs() < 1e-12, "{nu} {more}: {}", ratio(&scene));
+        let told = scene
+            .warnings
+            .iter()
+            .any(|warning| warning.contains(&format!("has Poisson's ratio {nu}; it is taken to have {taken}")));
+        assert_eq!(told, nu != taken.to_string(), "{nu} {more}: {:?}", scene.warnings);
+    }
 }
 
 #[test]
