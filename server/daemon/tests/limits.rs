@@ -260,8 +260,8 @@ fn a_summary_tells_what_particles_are_awake_for() {
     assert!(both > 20 && rest < loads, "{both} {rest}");
 }
 
-/// Pressed as deep, a body of Poisson's ratio 0.499 answers nearly the same whether its waves of volume are slowed or not, and takes at most twice as many
-/// substeps as one of 0.45 where they are.
+/// Pressed as deep, a body of Poisson's ratio 0.499 answers nearly the same whether its waves of volume are slowed or not. Where they are it takes up to two
+/// and a half times the substeps of one of 0.45, which is less than twice the time (`docs/adr/poisson-limit.md`).
 #[test]
 fn a_body_that_keeps_its_volume_is_as_stiff_with_slower_waves_of_volume() {
     let tool = "[[tool]]\nname = \"ball\"\nradius_mm = 8\ncoupling = \"rigid\"\ndriver = \"script\"\n\
@@ -284,7 +284,7 @@ fn a_body_that_keeps_its_volume_is_as_stiff_with_slower_waves_of_volume() {
     let (usual, slowed) = (pressed("0.45", "spacing_mm = 2.5"), pressed("0.499", "spacing_mm = 2.5"));
     let exact = pressed("0.499", "spacing_mm = 2.5\nmost_poisson_ratio = 0.5");
     println!("{usual:?} {slowed:?} {exact:?}");
-    assert!((slowed.0 / exact.0 - 1.0).abs() < 0.03, "{slowed:?} {exact:?}");
-    assert!(slowed.1 <= 2.0 * usual.1 && exact.1 > 2.0 * slowed.1, "{usual:?} {slowed:?} {exact:?}");
+    assert!((slowed.0 / exact.0 - 1.0).abs() < 0.01, "{slowed:?} {exact:?}");
+    assert!(slowed.1 <= 2.5 * usual.1 && exact.1 > 2.0 * slowed.1, "{usual:?} {slowed:?} {exact:?}");
     assert_eq!([usual.2, slowed.2, exact.2], [false, true, false]);
 }

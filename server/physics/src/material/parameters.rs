@@ -90,8 +90,10 @@ impl Lame {
     /// stay as they are.
     #[must_use]
     pub fn with_poisson_ratio_up_to(self, most: f64) -> Self {
+        /// A ratio that was given as `most` may come back a little larger.
+        const ROUNDING: f64 = 1e-9;
         let nu = self.poisson_ratio();
-        if nu <= most {
+        if nu <= most + ROUNDING {
             return self;
         }
         let mu_pa = self.mu_pa * (1.0 - most) / (1.0 - nu);
