@@ -1,6 +1,9 @@
 //! The vertices and triangles that may meet before the surface has moved some way, in a list that never grows.
 
-use crate::contact::{CarriersThen, MostCarriers, broad::ROUNDING_M};
+use crate::contact::{
+    CarriersThen, MostCarriers,
+    broad::{ROUNDING_M, Skin},
+};
 use glam::DVec3;
 
 /// Most pairs that are listed, per vertex of the skin, and at least.
@@ -12,6 +15,13 @@ const AWAKE_FIRST: f64 = 0.04;
 const AWAKE: f64 = 0.2;
 /// Part of the way until the next query below which a list is made anew rather than looked after.
 const WORTH_KEEPING: f64 = 0.25;
+/// Part of the way until the next query that is little: how far a vertex has moved matters no further below it.
+const LITTLE: f64 = 0.25;
+/// Strides that a list serves where little is near: where a list for so many has no more than `MANY` pairs, and the one before, if it was
+/// for one stride, no more than `FEW`.
+const STRIDES: f64 = 4.0;
+const FEW: usize = 16;
+const MANY: usize = 512;
 /// A way (m) that no surface moves between two queries.
 const FOR_EVER_M: f64 = 1e6;
 
@@ -30,6 +40,8 @@ pub(super) struct Pair {
 pub(in crate::contact) struct NearWalls {
     pairs: Box<[Pair]>,
     count: usize,
+    /// Whether it is for several strides, or the next is to be.
+    serves_long: bool,
     /// How far (m) the surface may still move until the list is out of date.
     pub(in crate::contact) slack_m: f64,
     /// The same when the list was made.
@@ -51,6 +63,7 @@ impl Default for NearWalls {
         Self {
             pairs: Box::default(),
             count: 0,
+            serves_long: true,
             slack_m: f64::NEG_INFINITY,
             whole_slack_m: 0.0,
             missed: 0,
@@ -75,6 +88,18 @@ impl NearWalls {
     /// Returns the pairs, sorted by vertex and then by triangle.
     pub(super) fn pairs(&self) -> &[Pair] {
         &self.pairs[..self.count]
+    }
+
+    /// Returns how many strides the next list is to serve at least.
+    pub(super) fn strides(&self) -> f64 {
+        if self.serves_long { STRIDES } else { 1.0 }
+    }
+
+    /// Returns whether so much is near that a list for several strides costs more than it saves; the next is for one.
+    pub(super) fn is_for_too_long(&mut self) -> bool {
+        let is = self.serves_long && self.count > MANY;
+        self.serves_long &= !is;
+        is
     }
 
     /// Returns a bound of how far (m) the surface is from where it was at the query.
@@ -104,6 +129,11 @@ impl NearWalls {
     /// Returns how far (m) the farthest of nodes at `x` (m) is from where it was when the list was made.
     pub(super) fn farthest_m(&self, x: &[DVec3]) -> f64 {
         x.iter().zip(&self.then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Does the same of the vertices of a skin; where none has moved far the bound is larger than need be.
+    pub(super) fn skin_moved_m(&self, skin: &impl Skin) -> f64 {
+        skin.moved_m(&self.carriers_then, &self.then_m, LITTLE * self.whole_slack_m)
     }
 
     /// Returns the pairs that may be within reach until the surface has moved some way.
@@ -165,6 +195,7 @@ impl NearWalls {
                 pair.free_m = pair.free_m.max(free_m);
             }
         }
+        self.serves_long |= self.count <= FEW;
         self.slack_m = slack_m.min(FOR_EVER_M);
         self.whole_slack_m = self.slack_m;
         self.awake_m = AWAKE_FIRST * self.whole_slack_m;

@@ -78,6 +78,15 @@ struct Query<'a> {
     clusters: &'a [ClusterNow],
     groups: &'a [[DVec3; 2]],
     near: &'a mut NearWalls,
+    /// How far (m) the surface may move at least until the next query.
+    stride_m: f64,
+}
+
+impl Query<'_> {
+    /// Returns the distance (m) within which what may meet is listed, with the largest reach (m) of any vertex.
+    fn listed_m(&self, reach_m: f64) -> f64 {
+        reach_m + 2.0 * self.stride_m
+    }
 }
 
 impl SelfContact {
@@ -106,11 +115,23 @@ impl SelfContact {
             let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
             *group = clusters.iter().fold(none, |[low, high], now| [low.min(now.low_m), high.max(now.high_m)]);
         }
+        let mut slack_m = self.list_near(x, near, scratch);
+        if near.is_for_too_long() {
+            near.clear();
+            slack_m = self.list_near(x, near, scratch);
+        }
+        near.finish(slack_m - ROUNDING_M, |of_vertex| self.later_m(of_vertex, x));
+    }
+
+    /// Lists what may meet within the strides that the list is to serve, with clusters as they are now. Returns how far (m) the
+    /// surface may move until what was not listed might be within reach.
+    fn list_near(&self, x: &[DVec3], near: &mut NearWalls, scratch: &mut WallScratch) -> f64 {
         let WallScratch { clusters, groups, near_groups, .. } = scratch;
-        let mut query = Query { x, clusters, groups, near };
+        let stride_m = self.stride_m * near.strides();
+        let mut query = Query { x, clusters, groups, near, stride_m };
         let mut slack_m = f64::INFINITY;
-        for group in 0..groups.len() {
-            let others_m = self.find_near_groups(group, groups, near_groups);
+        for group in 0..query.groups.len() {
+            let others_m = self.find_near_groups(group, &query, near_groups);
             for cluster in clusters_of(group, self.clusters.len()) {
                 slack_m = slack_m.min(self.look_close(cluster, &mut query)).min(self.look_far(
                     cluster,
@@ -120,7 +141,7 @@ impl SelfContact {
                 ));
             }
         }
-        near.finish(slack_m - ROUNDING_M, |of_vertex| self.later_m(of_vertex, x));
+        slack_m
     }
 
     /// Looks at a cluster with those that are close to it at rest. This and what follows return how far (m) the surface
@@ -130,7 +151,7 @@ impl SelfContact {
             self.left_m(self.clusters[cluster].free_close_m, &query.clusters[cluster])
         };
         let mut slack_m = left_m(one, query);
-        if slack_m >= self.stride_m {
+        if slack_m >= query.stride_m {
             return slack_m;
         }
         slack_m = f64::INFINITY;
@@ -138,7 +159,7 @@ impl SelfContact {
         for entry in self.close.row(one) {
             let other = entry.cluster as usize;
             // A pair of which both have moved far is looked at from the first.
-            if other >= one || left_m(other, query) >= self.stride_m {
+            if other >= one || left_m(other, query) >= query.stride_m {
                 slack_m = slack_m.min(self.close_pair([one, other], entry.free_m, &mut turned, query));
             }
         }
@@ -147,12 +168,13 @@ impl SelfContact {
 
     /// Finds the groups whose clusters may be near those of a group. Returns how far (m) the surface may move until what is
     /// in the others might be within reach.
-    fn find_near_groups(&self, group: usize, groups: &[[DVec3; 2]], near_groups: &mut Vec<u32>) -> f64 {
+    fn find_near_groups(&self, group: usize, query: &Query<'_>, near_groups: &mut Vec<u32>) -> f64 {
         near_groups.clear();
+        let (groups, apart_m) = (query.groups, GROUPS_APART * query.listed_m(self.reach_m));
         let mut slack_m = f64::INFINITY;
         for (other, of_other) in (0..).zip(groups) {
             let bound_m = boxes_distance_m(groups[group], *of_other);
-            if bound_m >= GROUPS_APART * self.listed_m() {
+            if bound_m >= apart_m {
                 slack_m = slack_m.min(0.5 * (bound_m - self.reach_m));
             } else {
                 near_groups.push(other);
@@ -168,7 +190,7 @@ impl SelfContact {
             self.left_m(self.clusters[cluster].free_far_m, &query.clusters[cluster])
         };
         let mut slack_m = left_m(one, query);
-        if slack_m >= self.stride_m {
+        if slack_m >= query.stride_m {
             return slack_m;
         }
         slack_m = others_m;
@@ -177,14 +199,14 @@ impl SelfContact {
         for &group in near_groups {
             let group = group as usize;
             let bound_m = boxes_distance_m([now.low_m, now.high_m], query.groups[group]);
-            if bound_m >= self.listed_m() {
+            if bound_m >= query.listed_m(self.reach_m) {
                 slack_m = slack_m.min(0.5 * (bound_m - self.reach_m));
                 continue;
             }
             for other in clusters_of(group, self.clusters.len()) {
                 while close.next_if(|close| *close < other).is_some() {}
                 let is_close = close.peek() == Some(&other);
-                if !is_close && (other >= one || left_m(other, query) >= self.stride_m) {
+                if !is_close && (other >= one || left_m(other, query) >= query.stride_m) {
                     slack_m = slack_m.min(self.far_pair([one, other], query));
                 }
             }
@@ -206,7 +228,7 @@ impl SelfContact {
             return f64::INFINITY;
         }
         let bound_m = a.distance_m(b);
-        if bound_m >= self.listed_m() {
+        if bound_m >= query.listed_m(self.reach_m) {
             return 0.5 * (bound_m - self.reach_m);
         }
         let slack_m = self.list([one, other], None, query);
@@ -228,7 +250,7 @@ impl SelfContact {
             return f64::INFINITY;
         }
         let bound_m = (free_m - a.displaced.differs_m(&b.displaced)).max(a.distance_m(b));
-        if bound_m >= self.listed_m() {
+        if bound_m >= query.listed_m(self.reach_m) {
             return 0.5 * (bound_m - self.reach_m);
         }
         let turned = turned.get_or_insert_with(|| {
@@ -237,7 +259,7 @@ impl SelfContact {
         });
         let of_other = self.displaced_in(other, &turned.frame, query.x);
         let bound_m = bound_m.max(free_m - turned.displaced.differs_m(&of_other));
-        if bound_m >= self.listed_m() {
+        if bound_m >= query.listed_m(self.reach_m) {
             return 0.5 * (bound_m - self.reach_m);
         }
         let frame = turned.frame;
@@ -247,11 +269,6 @@ impl SelfContact {
         }
         let of_one = turned.displaced;
         slack_m.min(self.list([other, one], Some((&frame, &of_one)), query))
-    }
-
-    /// Returns the distance (m) within which what may meet is listed, whatever vertex it is.
-    fn listed_m(&self) -> f64 {
-        self.reach_m + 2.0 * self.stride_m
     }
 
     fn is_torn(&self, cluster: usize, now: &ClusterNow) -> bool {
@@ -278,7 +295,7 @@ impl SelfContact {
                 continue;
             }
             let reach_m = at.reach_m();
-            let listed_m = reach_m + 2.0 * self.stride_m;
+            let listed_m = query.listed_m(reach_m);
             let rest_m = self.rest_m[node as usize];
             let free_m = close.map_or(f64::NEG_INFINITY, |(frame, of_triangles)| {
                 let as_seen = of_triangles.differs_from_m(y - *frame * rest_m);
@@ -293,7 +310,7 @@ impl SelfContact {
             for (triangle, &mut ball) in triangles.clone().zip(balls) {
                 let within_m = listed_m + ball.radius_m;
                 if y.distance_squared(ball.middle_m) >= within_m * within_m {
-                    slack_m = slack_m.min(self.stride_m);
+                    slack_m = slack_m.min(query.stride_m);
                     continue;
                 }
                 let distance_m = self.distance_m(y, triangle, x);
