@@ -111,9 +111,8 @@ pub(crate) trait Skin {
     /// Notes where what carries the skin is.
     fn remember(&self, _: &mut CarriersThen) {}
 
-    /// Returns a bound of how far (m) any vertex is from where it was then, at `x` (m); below `enough_m` it need not be sharp.
-    /// Nothing is known of a skin that notes nothing.
-    fn moved_m(&self, _: &CarriersThen, _x: &[DVec3], _enough_m: f64) -> f64 {
+    /// Returns a bound of how far (m) any vertex is from where it was then. Nothing is known of a skin that notes nothing.
+    fn moved_m(&self, _: &CarriersThen) -> f64 {
         f64::INFINITY
     }
 }

@@ -1,34 +1,41 @@
-//! Where what carries a skin was some time ago: a bound of how far the skin has moved since then, with few of its vertices.
+//! Where what carries a skin was some time ago: a bound of how far the skin has moved since then, without its vertices.
 use glam::DVec3;
 
-/// How much carries a skin; nothing a surface whose vertices are nodes.
+/// How many nodes and particles carry a skin; none of a surface whose vertices are nodes.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MostCarriers {
     /// Coarse nodes.
     pub(crate) nodes: usize,
-    /// Clusters of its triangles, of which active particles carry some.
-    pub(crate) clusters: usize,
+    /// Most particles that are active at once.
+    pub(crate) active: usize,
 }
 
-/// A skin's carriers at some instant. Its clones keep the capacity.
+/// Displacements (m) of a skin's carriers at some instant. Its clones keep the capacity.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CarriersThen {
     nodes_m: Box<[DVec3]>,
-    is_active: Box<[bool]>,
+    /// Active particles, ascending.
+    particles_m: Box<[(u32, DVec3)]>,
+    count: usize,
 }
 
 impl CarriersThen {
     pub(crate) fn with_room(most: MostCarriers) -> Self {
         Self {
             nodes_m: vec![DVec3::ZERO; most.nodes].into_boxed_slice(),
-            is_active: vec![false; most.clusters].into_boxed_slice(),
+            particles_m: vec![(0, DVec3::ZERO); most.active].into_boxed_slice(),
+            count: 0,
         }
     }
 
-    /// Notes the displacements (m) of nodes, and of each cluster whether active particles carry vertices of it. Allocates nothing.
-    pub(crate) fn remember(&mut self, nodes_m: &[DVec3], is_active: &[bool]) {
+    /// Notes the displacements (m) of nodes and active particles, which are ascending. Allocates nothing.
+    pub(crate) fn remember(&mut self, nodes_m: &[DVec3], particles_m: impl Iterator<Item = (u32, DVec3)>) {
         self.nodes_m.copy_from_slice(nodes_m);
-        self.is_active.copy_from_slice(is_active);
+        self.count = 0;
+        for (slot, particle) in self.particles_m.iter_mut().zip(particles_m) {
+            *slot = particle;
+            self.count += 1;
+        }
     }
 
     /// Returns the displacements (m) of the nodes.
@@ -36,8 +43,8 @@ impl CarriersThen {
         &self.nodes_m
     }
 
-    /// Returns whether active particles carried vertices of a cluster.
-    pub(crate) fn is_active(&self, cluster: usize) -> bool {
-        self.is_active[cluster]
+    /// Returns the particles that were active, ascending, with their displacements (m).
+    pub(crate) fn particles_m(&self) -> &[(u32, DVec3)] {
+        &self.particles_m[..self.count]
     }
 }

@@ -1,7 +1,7 @@
 //! Builds a hybrid body and its environment from a specification.
 use super::{HybridBody, HybridError, HybridSpec, body::Built};
 use crate::{
-    contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, broad::CLUSTER, moduli},
+    contact::{ContactModel, MostCarriers, SkinAtRest, SkinFollows, moduli},
     mesh::Surface,
     settings::Integrator,
     tick::{
@@ -57,7 +57,7 @@ impl HybridBody {
             } else {
                 SkinFollows::StiffElements
             },
-            carriers: MostCarriers { nodes: hybrid.node_count(), clusters: surface.triangles.len().div_ceil(CLUSTER) },
+            carriers: MostCarriers { nodes: hybrid.node_count(), active: hybrid.particles().most_active },
         };
         let contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());

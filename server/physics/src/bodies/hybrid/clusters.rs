@@ -107,14 +107,6 @@ impl SkinClusters {
     pub(super) fn group_distance_m(&self, group: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
         self.groups.distance_m(group, from_m, bounds)
     }
-
-    /// Returns a bound of how far (m) any vertex of a cluster that no active particle carries moved between two instants, of which
-    /// the displacements (m) of the coarse nodes are given: `a max |Δu_i|`.
-    pub(super) fn moved_m(&self, cluster: usize, [then_m, now_m]: [&[DVec3]; 2]) -> f64 {
-        let node_sq = |&node: &u32| now_m[node as usize].distance_squared(then_m[node as usize]);
-        let farthest_sq = self.clusters.nodes(cluster).iter().map(node_sq).fold(0.0, f64::max);
-        self.clusters.amplification[cluster] * farthest_sq.sqrt()
-    }
 }
 
 /// What bounds how the skin moved.
@@ -161,14 +153,10 @@ impl Boxes {
         self.first_vertex.push(self.vertices.len() as u32);
     }
 
-    /// Returns the coarse nodes that a box follows.
-    fn nodes(&self, number: usize) -> &[u32] {
-        &self.nodes[self.first[number] as usize..self.first[number + 1] as usize]
-    }
-
     fn distance_m(&self, number: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
+        let nodes = &self.nodes[self.first[number] as usize..self.first[number + 1] as usize];
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for &node in self.nodes(number) {
+        for &node in nodes {
             let u = bounds.displacements_m[node as usize];
             (least, most) = (least.min(u), most.max(u));
         }

@@ -1,9 +1,6 @@
 //! The vertices and triangles that may meet before the surface has moved some way, in a list that never grows.
 
-use crate::contact::{
-    CarriersThen, MostCarriers,
-    broad::{ROUNDING_M, Skin},
-};
+use crate::contact::{CarriersThen, MostCarriers, broad::ROUNDING_M};
 use glam::DVec3;
 
 /// Most pairs that are listed, per vertex of the skin, and at least.
@@ -15,13 +12,8 @@ const AWAKE_FIRST: f64 = 0.04;
 const AWAKE: f64 = 0.2;
 /// Part of the way until the next query below which a list is made anew rather than looked after.
 const WORTH_KEEPING: f64 = 0.25;
-/// Part of the way until the next query that is little: how far a vertex has moved matters no further below it.
-const LITTLE: f64 = 0.25;
-/// Strides that a list serves where little is near: where a list for so many has no more than `MANY` pairs, and the one before, if it was
-/// for one stride, no more than `FEW`.
-const STRIDES: f64 = 4.0;
-const FEW: usize = 16;
-const MANY: usize = 512;
+/// Number of lists for one stride after it did not pay to list for several.
+const SHORT: u32 = 64;
 /// A way (m) that no surface moves between two queries.
 const FOR_EVER_M: f64 = 1e6;
 
@@ -40,8 +32,8 @@ pub(super) struct Pair {
 pub(in crate::contact) struct NearWalls {
     pairs: Box<[Pair]>,
     count: usize,
-    /// Whether it is for several strides, or the next is to be.
-    serves_long: bool,
+    /// Number of lists until it is tried again to list for several strides.
+    short: u32,
     /// How far (m) the surface may still move until the list is out of date.
     pub(in crate::contact) slack_m: f64,
     /// The same when the list was made.
@@ -63,7 +55,7 @@ impl Default for NearWalls {
         Self {
             pairs: Box::default(),
             count: 0,
-            serves_long: true,
+            short: 0,
             slack_m: f64::NEG_INFINITY,
             whole_slack_m: 0.0,
             missed: 0,
@@ -90,16 +82,15 @@ impl NearWalls {
         &self.pairs[..self.count]
     }
 
-    /// Returns how many strides the next list is to serve at least.
-    pub(super) fn strides(&self) -> f64 {
-        if self.serves_long { STRIDES } else { 1.0 }
+    /// Returns whether it is to be tried to list for several strides.
+    pub(super) fn tries_long(&mut self) -> bool {
+        self.short = self.short.saturating_sub(1);
+        self.short == 0
     }
 
-    /// Returns whether so much is near that a list for several strides costs more than it saves; the next is for one.
-    pub(super) fn is_for_too_long(&mut self) -> bool {
-        let is = self.serves_long && self.count > MANY;
-        self.serves_long &= !is;
-        is
+    /// Notes whether so little is near that it pays to list for several strides; if not, the next lists are for one.
+    pub(super) fn tried_long(&mut self, pays: bool) {
+        self.short = if pays { 0 } else { SHORT };
     }
 
     /// Returns a bound of how far (m) the surface is from where it was at the query.
@@ -129,11 +120,6 @@ impl NearWalls {
     /// Returns how far (m) the farthest of nodes at `x` (m) is from where it was when the list was made.
     pub(super) fn farthest_m(&self, x: &[DVec3]) -> f64 {
         x.iter().zip(&self.then_m).map(|(now, then)| now.distance_squared(*then)).fold(0.0, f64::max).sqrt()
-    }
-
-    /// Does the same of the vertices of a skin; where none has moved far the bound is larger than need be.
-    pub(super) fn skin_moved_m(&self, skin: &impl Skin) -> f64 {
-        skin.moved_m(&self.carriers_then, &self.then_m, LITTLE * self.whole_slack_m)
     }
 
     /// Returns the pairs that may be within reach until the surface has moved some way.
@@ -195,7 +181,6 @@ impl NearWalls {
                 pair.free_m = pair.free_m.max(free_m);
             }
         }
-        self.serves_long |= self.count <= FEW;
         self.slack_m = slack_m.min(FOR_EVER_M);
         self.whole_slack_m = self.slack_m;
         self.awake_m = AWAKE_FIRST * self.whole_slack_m;

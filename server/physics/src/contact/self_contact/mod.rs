@@ -26,6 +26,7 @@ mod build;
 mod compact;
 mod facing;
 mod gap;
+mod later;
 mod lists;
 mod press;
 mod query;

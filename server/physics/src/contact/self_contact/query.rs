@@ -14,7 +14,7 @@
 use super::{
     bounds::{Ball, ClusterNow, Displacements, Turned, boxes_distance_m},
     lists::{NearWalls, Pair},
-    rest::{SelfContact, twice_area_m2},
+    rest::SelfContact,
 };
 use crate::contact::{
     broad::{self, CLUSTER, ROUNDING_M, box_distance_m},
@@ -26,13 +26,12 @@ use std::ops::Range;
 /// Size of a cluster over that at rest from which it is torn. In a step that was too long and will be repeated, the body may
 /// be anywhere, and would be looked at vertex by vertex for seconds.
 const TORN: f64 = 8.0;
-/// By how much a height over a plane may fall more than the plane's corners and the point tell, since the plane turns.
-const TURNING: f64 = 1.1;
-/// Way of a triangle's corners over its least height while which its plane turns by no more than 25°.
-const TURNS_WITHIN: f64 = 0.2;
 /// Distance of groups over that within which what may meet is listed, from which clusters of one are not compared with those
 /// of the other.
 const GROUPS_APART: f64 = 2.0;
+/// Strides that a list serves at least where little is near, and how often clusters may be looked at vertex by vertex for it.
+const STRIDES: f64 = 4.0;
+const MOST_LOOKS: u32 = 8;
 /// Number of clusters that are ruled out together.
 const GROUP: usize = broad::GROUP / CLUSTER;
 
@@ -80,6 +79,8 @@ struct Query<'a> {
     near: &'a mut NearWalls,
     /// How far (m) the surface may move at least until the next query.
     stride_m: f64,
+    /// How often vertices of one cluster were looked at with the triangles of another.
+    looks: u32,
 }
 
 impl Query<'_> {
@@ -115,20 +116,31 @@ impl SelfContact {
             let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
             *group = clusters.iter().fold(none, |[low, high], now| [low.min(now.low_m), high.max(now.high_m)]);
         }
-        let mut slack_m = self.list_near(x, near, scratch);
-        if near.is_for_too_long() {
-            near.clear();
-            slack_m = self.list_near(x, near, scratch);
+        let mut slack_m = None;
+        if near.tries_long() {
+            slack_m = self.list_near(x, STRIDES, MOST_LOOKS, near, scratch);
+            near.tried_long(slack_m.is_some());
         }
+        let slack_m = slack_m.unwrap_or_else(|| {
+            near.clear();
+            self.list_near(x, 1.0, u32::MAX, near, scratch).unwrap_or(f64::NEG_INFINITY)
+        });
         near.finish(slack_m - ROUNDING_M, |of_vertex| self.later_m(of_vertex, x));
     }
 
-    /// Lists what may meet within the strides that the list is to serve, with clusters as they are now. Returns how far (m) the
-    /// surface may move until what was not listed might be within reach.
-    fn list_near(&self, x: &[DVec3], near: &mut NearWalls, scratch: &mut WallScratch) -> f64 {
+    /// Lists what may meet within so many strides, with clusters as they are now. Returns how far (m) the surface may move until what
+    /// was not listed might be within reach, or `None` where clusters would have to be looked at vertex by vertex more often than
+    /// `most_looks`.
+    fn list_near(
+        &self,
+        x: &[DVec3],
+        strides: f64,
+        most_looks: u32,
+        near: &mut NearWalls,
+        scratch: &mut WallScratch,
+    ) -> Option<f64> {
         let WallScratch { clusters, groups, near_groups, .. } = scratch;
-        let stride_m = self.stride_m * near.strides();
-        let mut query = Query { x, clusters, groups, near, stride_m };
+        let mut query = Query { x, clusters, groups, near, stride_m: strides * self.stride_m, looks: 0 };
         let mut slack_m = f64::INFINITY;
         for group in 0..query.groups.len() {
             let others_m = self.find_near_groups(group, &query, near_groups);
@@ -139,9 +151,12 @@ impl SelfContact {
                     others_m,
                     &mut query,
                 ));
+                if query.looks > most_looks {
+                    return None;
+                }
             }
         }
-        slack_m
+        Some(slack_m)
     }
 
     /// Looks at a cluster with those that are close to it at rest. This and what follows return how far (m) the surface
@@ -284,6 +299,7 @@ impl SelfContact {
         close: Option<(&DMat3, &Displacements)>,
         query: &mut Query<'_>,
     ) -> f64 {
+        query.looks += 1;
         let (x, other) = (query.x, &query.clusters[of_triangles]);
         let triangles = self.triangles.cluster_range(of_triangles);
         // Of most clusters no vertex is as near as that.
@@ -335,38 +351,6 @@ impl SelfContact {
                 }
             }
         }
-    }
-
-    /// Returns how far (m) the surface has to move before a vertex with these pairs may be pressed: before it is within its
-    /// margin of a triangle or, as at a rim, of the plane of one, or behind the plane of one that has a corner with it in
-    /// common, by which it may be told that it is behind. −∞ where it may be pressed already.
-    fn later_m(&self, of_vertex: &[Pair], x: &[DVec3]) -> f64 {
-        let Some(first) = of_vertex.first() else { return f64::NEG_INFINITY };
-        let (y, margin_m) = (x[first.node as usize], self.nodes[first.node as usize].margin_m);
-        let of_pair_m = |pair: &Pair| {
-            let triangle = pair.triangle as usize;
-            let to_wall_m = 0.5 * (self.distance_m(y, triangle, x) - margin_m);
-            let around = self.triangles.nodes[triangle].iter().flat_map(|node| self.around.row(*node as usize));
-            let behind_m =
-                around.map(|&other| self.to_plane_m(y, other as usize, 0.0, x)).fold(f64::INFINITY, f64::min);
-            to_wall_m.min(self.to_plane_m(y, triangle, margin_m, x)).min(behind_m)
-        };
-        let least_m = of_vertex.iter().map(of_pair_m).fold(f64::INFINITY, f64::min) - ROUNDING_M;
-        if least_m > 0.0 { least_m } else { f64::NEG_INFINITY }
-    }
-
-    /// Returns how far (m) the surface has to move before a vertex at `y` (m) may be lower than this over a triangle's plane.
-    /// With the weights `β` of its foot on the plane, its height falls by no more than `1 + Σ |β_i|` times that over the cosine
-    /// by which the plane turns, which is little while its corners move by no more than a part of the triangle's least height.
-    fn to_plane_m(&self, y: DVec3, triangle: usize, height_m: f64, x: &[DVec3]) -> f64 {
-        let [a, b, c] = self.triangles.corners(triangle, x);
-        let (area, from) = (twice_area_m2([a, b, c]), y - a);
-        let area_sq = area.length_squared();
-        let wb = from.cross(c - a).dot(area) / area_sq;
-        let wc = (b - a).cross(from).dot(area) / area_sq;
-        let falls = TURNING * (1.0 + (1.0 - wb - wc).abs() + wb.abs() + wc.abs());
-        let turns_m = TURNS_WITHIN * area_sq.sqrt() / a.distance(b).max(b.distance(c).max(c.distance(a)));
-        turns_m.min((from.dot(area) / area_sq.sqrt() - height_m) / falls)
     }
 
     pub(super) fn distance_m(&self, y: DVec3, triangle: usize, x: &[DVec3]) -> f64 {

@@ -28,7 +28,7 @@ impl ContactModel {
     ) -> bool {
         let Some(walls) = self.walls() else { return false };
         let near = &mut contact.walls;
-        if near.slack_m > 0.0 || near.is_still_good(|near| near.skin_moved_m(skin)) {
+        if near.slack_m > 0.0 || near.is_still_good(|near| skin.moved_m(&near.carriers_then)) {
             return near.wakes_more();
         }
         let mut x = std::mem::take(&mut scratch.walls.x);

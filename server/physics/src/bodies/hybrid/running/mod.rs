@@ -197,11 +197,6 @@ impl RunningPatch {
         self.carries_of_cluster[cluster]
     }
 
-    /// Returns the same of every cluster.
-    pub(super) fn clusters_carried(&self) -> &[bool] {
-        &self.carries_of_cluster
-    }
-
     /// Returns the same for a group.
     pub(super) fn carries_of_group(&self, group: usize) -> bool {
         self.carries_of_group[group]
