@@ -1,26 +1,14 @@
 //! The masses of a body whose particles all sleep, lumped on the coarse nodes that they follow: `M_i = Σ_p m_p ζ_pi`, by which
 //! gravity pulls, too.
 //!
-//! Each cell gives an eighth of its mass to each of its particles. Where the skin lies a little before a plane of particles, the cells between hold
-//! next to nothing, and so little mass would bear what presses the skin that contact, whose stiffness over mass is bounded, gives way: a heart
-//! was 8 % too soft where a plane lay 0.1 spacings beyond its wall, the fingertip 1.3 mm in it. So a particle has at least an eighth of a whole
-//! cell's mass, as at the corner of a box, and what it lacks comes from the particles of its cells that have more. The body's mass stays, and
-//! what rests does not know of it; about a tenth of a particle's mass is a spacing farther out.
-//!
 //! Particles outside the coarse tets have negative weights. They are lumped with others, so that the lumped masses have no
 //! less kinetic energy than the particles ([`super::composite::Anchor::bearing_weights`]); gravity pulls by the plain sum.
 use super::partition::Partition;
-use std::collections::BTreeSet;
 
 /// A coarse node that no particle follows with more weight than this has no mass, and stays: where particles lie in the
 /// faces of coarse tets, nodes beside the faces are followed by rounding alone, and the rounding of forces in single
 /// precision would throw such masses anywhere.
 const NO_FOLLOWER: f64 = 1e-6;
-
-/// Part of a mass that is rounding.
-const ROUNDING: f64 = 1e-9;
-/// Least mass of a particle, over that of a whole cell.
-const LEAST: f64 = 0.125;
 
 /// Masses of a body whose particles all sleep.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,8 +22,7 @@ pub struct Masses {
 }
 
 impl Masses {
-    /// Gives an eighth of each cell's mass to each of its particles, shares it with those that have next to nothing, and gives the mass of
-    /// particles to the coarse nodes.
+    /// Gives an eighth of each cell's mass to each of its particles, and that of the particles to the coarse nodes.
     /// `density_kg_per_m3` is that of a coarse tet.
     pub fn new(partition: &Partition, density_kg_per_m3: impl Fn(usize) -> f64) -> Self {
         let mut particle_kg = vec![0.0; partition.particle_count()];
@@ -45,7 +32,6 @@ impl Masses {
                 particle_kg[particle as usize] += density * volume_m3;
             }
         }
-        share(partition, &mut particle_kg, &density_kg_per_m3);
         let mut node_kg = vec![0.0; partition.coarse().positions_m().len()];
         let mut node_weight_kg = node_kg.clone();
         let mut largest_weights = node_kg.clone();
@@ -61,48 +47,6 @@ impl Masses {
             (node_kg[node], node_weight_kg[node]) = (0.0, 0.0);
         }
         Self { particle_kg, node_kg, node_weight_kg }
-    }
-}
-
-/// Gives particles that have less than [`LEAST`] of a whole cell's mass what they lack, from the particles of their cells that have more: of
-/// each the same part of what it has more, so that none comes to have less than its least mass itself. Where these have too little it stays at what
-/// they have.
-fn share(partition: &Partition, particle_kg: &mut [f64], density_kg_per_m3: &impl Fn(usize) -> f64) {
-    // A corner that hangs bears nothing of its cell.
-    let bearing = |cell: usize| {
-        let corners = partition.corners(cell).into_iter().zip(partition.particles_m3(cell));
-        corners.filter(|(_, volume_m3)| *volume_m3 > 0.0).map(|(particle, _)| particle)
-    };
-    let mut least_kg = vec![0.0; particle_kg.len()];
-    let mut neighbours: Vec<BTreeSet<u32>> = vec![BTreeSet::new(); particle_kg.len()];
-    for (number, cell) in partition.cells().iter().enumerate() {
-        let whole_kg = density_kg_per_m3(cell.tet as usize) * partition.edge_m(number).powi(3);
-        for particle in bearing(number) {
-            let least_kg = &mut least_kg[particle as usize];
-            *least_kg = f64::max(*least_kg, LEAST * whole_kg);
-        }
-    }
-    // Of a box's corners rounding alone could make particles that lack something.
-    let lacks_kg = |particle: usize, mass_kg: f64| least_kg[particle] * (1.0 - ROUNDING) - mass_kg;
-    for number in 0..partition.cells().len() {
-        for particle in bearing(number) {
-            if lacks_kg(particle as usize, particle_kg[particle as usize]) > 0.0 {
-                neighbours[particle as usize].extend(bearing(number).filter(|&other| other != particle));
-            }
-        }
-    }
-    for (particle, neighbours) in neighbours.iter().enumerate().filter(|(_, neighbours)| !neighbours.is_empty()) {
-        let more_kg =
-            |other: u32, particle_kg: &[f64]| (particle_kg[other as usize] - least_kg[other as usize]).max(0.0);
-        let available_kg: f64 = neighbours.iter().map(|&other| more_kg(other, particle_kg)).sum();
-        let moved_kg = lacks_kg(particle, particle_kg[particle]).min(available_kg);
-        if moved_kg <= 0.0 {
-            continue;
-        }
-        for &other in neighbours {
-            particle_kg[other as usize] -= moved_kg * (more_kg(other, particle_kg) / available_kg);
-        }
-        particle_kg[particle] += moved_kg;
     }
 }
 
@@ -128,30 +72,6 @@ mod tests {
             for list in [&masses.particle_kg, &masses.node_kg] {
                 assert!((list.iter().sum::<f64>() / (1000.0 * volume_m3) - 1.0).abs() < 1e-12);
             }
-        }
-    }
-
-    /// The lattice's planes lie anywhere beside the skin: without what is shared the lightest particle has less than a thousandth of a cell's mass. A
-    /// box whose faces lie in planes has corners of an eighth, and nothing to share.
-    #[test]
-    fn no_particle_is_much_lighter_than_the_corner_of_a_box() {
-        for partition in embedded_balls() {
-            let eighths = |number: usize| partition.corners(number).into_iter().zip(partition.particles_m3(number));
-            let mut alone_kg = vec![0.0; partition.particle_count()];
-            for (particle, volume_m3) in (0..partition.cells().len()).flat_map(eighths) {
-                alone_kg[particle as usize] += 1000.0 * volume_m3;
-            }
-            let masses = Masses::new(&partition, |_| 1000.0).particle_kg;
-            let whole_kg = 1000.0 * partition.sites().spacing_m().powi(3);
-            let lightest = |masses: &[f64]| masses.iter().copied().fold(f64::INFINITY, f64::min) / whole_kg;
-            println!(
-                "{} of {} particles: {} {}",
-                masses.iter().zip(&alone_kg).filter(|(a, b)| a != b).count(),
-                masses.len(),
-                lightest(&alone_kg),
-                lightest(&masses)
-            );
-            assert!(lightest(&masses) > 0.9 * LEAST, "{} {}", lightest(&alone_kg), lightest(&masses));
         }
     }
 
