@@ -103,9 +103,9 @@ fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> 
 }
 
 /// A machine that runs tests stands still for 17 ms now and then, and then the force is gone for 0.7 s: so often is a press tried.
-const TRIES: usize = 7;
+const TRIES: usize = 11;
 /// Presses among which the simulated arm's force is to come twice.
-const PRESSES: usize = 10;
+const PRESSES: usize = 22;
 
 /// Presses until the force of a press, or the median of all so far, is that of `expected`, but for `most` of the peak (root mean
 /// square).
@@ -148,7 +148,7 @@ fn expected(daemon: &Daemon, hand: &Hand, recording: &Path) -> Curve {
             Some(first) => curve.laid_over(first),
             None => curve,
         });
-        // Medians are of odd numbers of presses: of the first three and the last three of six, of five and five of ten.
+        // Medians are of odd numbers of presses: of the first three and the last three of six, of five and five of ten, and so on.
         let (first, last) = earlier.split_at(earlier.len() / 2);
         if first.len() >= 3 && first.len() == last.len() && first.len() % 2 == 1 {
             let (first, last) = (Curve::median(first), Curve::median(last));
