@@ -261,7 +261,7 @@ fn a_summary_tells_what_particles_are_awake_for() {
 }
 
 /// Pressed as deep, a body of Poisson's ratio 0.499 answers nearly the same whether its waves of volume are slowed or not. Where they are it takes up to two
-/// and a half times the substeps of one of 0.45, which is less than twice the time (`docs/adr/poisson-limit.md`).
+/// and a half times the substeps of one of 0.45 (`docs/adr/poisson-limit.md` tells what that costs).
 #[test]
 fn a_body_that_keeps_its_volume_is_as_stiff_with_slower_waves_of_volume() {
     let tool = "[[tool]]\nname = \"ball\"\nradius_mm = 8\ncoupling = \"rigid\"\ndriver = \"script\"\n\

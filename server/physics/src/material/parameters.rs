@@ -86,7 +86,7 @@ impl Lame {
     /// µ' = µ (1 − ν')/(1 − ν),   λ' = 2µ'ν'/(1 − 2ν')
     /// ```
     /// keep `E/(1 − ν²) = 2µ/(1 − ν)`, by which a half-space resists indentation (Hertz 1882). In shear a body is then
-    /// `(ν − ν')/(1 − ν)` stiffer, 2 % from 0.499 to 0.488, where waves of volume are four times as slow. Smaller ratios
+    /// `(ν − ν')/(1 − ν)` stiffer, 2 % from 0.499 to 0.488, where waves of volume are 3.4 times as slow. Smaller ratios
     /// stay as they are.
     #[must_use]
     pub fn with_poisson_ratio_up_to(self, most: f64) -> Self {

@@ -82,7 +82,7 @@ impl NearWalls {
         &self.pairs[..self.count]
     }
 
-    /// Returns whether it is to be tried to list for several strides.
+    /// Counts a list that is to be made. Returns whether it is to be tried to make it for several strides.
     pub(super) fn tries_long(&mut self) -> bool {
         self.short = self.short.saturating_sub(1);
         self.short == 0

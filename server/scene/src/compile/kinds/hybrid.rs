@@ -259,11 +259,12 @@ fn limit_poisson_ratios(table: &ParticlesTable, regions: &mut [Region]) -> Resul
         (lame != region.material.lame).then(|| {
             format!(
                 "the material \"{}\" has Poisson's ratio {}; it is taken to have {}, and to be as stiff beneath a tool, as its waves of volume would ask for \
-                 many more substeps: most_poisson_ratio = 0.5 in [body.particles] leaves it as it is, and poisson_ratio = {} says what is taken",
+                 many more substeps: most_poisson_ratio = 0.5 in [body.particles] leaves it as it is, and poisson_ratio = {} with young_modulus_pa = {} says what is taken",
                 region.name,
                 short(lame.poisson_ratio()),
                 short(most),
-                short(most)
+                short(most),
+                short(region.material.lame.young_modulus_pa())
             )
         })
     };
