@@ -1,7 +1,7 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
 use palpate_lab::{
-    deep, fine_levels, hashes, hearts, jitter, locking, references, report, ripple, stress, subdivision,
+    deep, fine_levels, hashes, hearts, jitter, locking, references, report, ripple, skips, stress, subdivision,
 };
 
 #[derive(Parser)]
@@ -45,6 +45,8 @@ enum Command {
     Ripple,
     /// What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it
     Hearts(hearts::Options),
+    /// What a tick takes with each thing left out that a scene does not need, and without: a minute
+    Skips,
     /// Makes the two surfaces of the heart that is shipped (deploy/scenes/heart.toml)
     HeartSurfaces(hearts::ShippedOptions),
     /// Whether every bit of every scene is as it was (tests/lab/records/hashes.txt); exit code 1 if not
@@ -65,6 +67,7 @@ fn main() -> miette::Result<()> {
         Command::Deep(options) => deep::print(&options),
         Command::Ripple => ripple::print(),
         Command::Hearts(options) => hearts::print(&options),
+        Command::Skips => skips::print(),
         Command::HeartSurfaces(options) => hearts::write_shipped(&options),
         Command::Hashes(options) => hashes::run(&options),
     }

@@ -101,6 +101,11 @@ impl<'m> Slow<'m> {
         self.state.mechanical.tools[0].contact_force_n
     }
 
+    /// Its state now.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
     /// Where the first tool is (m).
     pub fn tool_m(&self) -> DVec3 {
         self.state.mechanical.tools.first().map_or(DVec3::NAN, |tool| tool.centre_m)

@@ -11,4 +11,5 @@ mod ticks;
 
 pub(crate) use scene::Heart;
 pub use shipped::{ShippedOptions, write as write_shipped};
-pub use ticks::{Options, print};
+pub(crate) use ticks::what;
+pub use ticks::{Asleep, HeartTicks, Options, measure, print};

@@ -11,7 +11,7 @@ use palpate_physics::{
     step,
 };
 use palpate_scene::Limits;
-use std::time::Instant;
+use std::{fmt, time::Instant};
 
 /// Radius (m) of the fingertip.
 const RADIUS_M: f64 = 6e-3;
@@ -32,6 +32,17 @@ const DRAG_TICKS: u32 = 1_000;
 const LEAVES_TICKS: u32 = 400;
 const SWAY_TICKS: u32 = 300;
 
+/// Tells what is measured, in two sentences.
+pub(crate) fn what() -> String {
+    format!(
+        "Ticks of 1 ms, in microseconds. A finger of {:.0} mm presses {:.0} mm deep and is dragged {:.0} mm to and fro at {:.0} mm/s.",
+        1e3 * RADIUS_M,
+        1e3 * DEPTH_M,
+        1e3 * DRAG_M,
+        1e3 * SPEED_M_PER_S
+    )
+}
+
 /// Which hearts.
 #[derive(Debug, Clone, Args)]
 pub struct Options {
@@ -49,33 +60,48 @@ pub struct Options {
     no_self_contact: bool,
 }
 
+impl Options {
+    /// So many hearts, with 200 and with 600 particles awake.
+    pub(crate) fn of(hearts: u64) -> Self {
+        Self { hearts, seed: 1, awake: vec![200, 600], no_self_contact: false }
+    }
+}
+
 /// Measures and prints, as the rows of a table.
 ///
 /// # Errors
 /// A heart that cannot be built.
 pub fn print(options: &Options) -> Result<()> {
-    println!(
-        "Ticks of 1 ms, in microseconds. A finger of {:.0} mm presses {:.0} mm deep and is dragged {:.0} mm to and fro at {:.0} mm/s.\n",
-        1e3 * RADIUS_M,
-        1e3 * DEPTH_M,
-        1e3 * DRAG_M,
-        1e3 * SPEED_M_PER_S
-    );
+    println!("{}\n", what());
     println!(
         "| heart | awake | substeps | at rest | dragged: median, p99, longest | substeps taken | mean force | swaying | asleep: after, median, p99 |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let text = palpate_scene::builtin("hybrid-ventricle").ok_or_else(|| miette!("the built-in scene is missing"))?;
-    let shipped = palpate_scene::parse(text, "hybrid-ventricle", None, &Limits::local(), &mut |_, _| {})?;
-    rows("hybrid-ventricle", &shipped.model, options)?;
-    for seed in options.seed..options.seed.saturating_add(options.hearts) {
-        let heart = Heart::random(seed)?;
-        rows(&format!("{seed}: {}", heart.told), &heart.spec, options)?;
-    }
+    measure(options, &mut |ticks| println!("{ticks}"))?;
     Ok(())
 }
 
-fn rows(name: &str, spec: &ModelSpec, options: &Options) -> Result<()> {
+/// Measures the ticks of `hybrid-ventricle` and of so many hearts, and tells each row as it comes.
+///
+/// # Errors
+/// A heart that cannot be made, or did not survive.
+pub fn measure(options: &Options, tell: &mut dyn FnMut(&HeartTicks)) -> Result<Vec<HeartTicks>> {
+    let mut all = Vec::new();
+    let text = palpate_scene::builtin("hybrid-ventricle").ok_or_else(|| miette!("the built-in scene is missing"))?;
+    let shipped = palpate_scene::parse(text, "hybrid-ventricle", None, &Limits::local(), &mut |_, _| {})?;
+    let mut keep = |ticks: HeartTicks| {
+        tell(&ticks);
+        all.push(ticks);
+    };
+    rows("hybrid-ventricle", &shipped.model, options, &mut keep)?;
+    for seed in options.seed..options.seed.saturating_add(options.hearts) {
+        let heart = Heart::random(seed)?;
+        rows(&format!("{seed}: {}", heart.told), &heart.spec, options, &mut keep)?;
+    }
+    Ok(all)
+}
+
+fn rows(name: &str, spec: &ModelSpec, options: &Options, keep: &mut dyn FnMut(HeartTicks)) -> Result<()> {
     for &awake in &options.awake {
         let mut spec = spec.clone();
         let BodySpec::Hybrid(hybrid) = &mut spec.body else { bail!("{name} has no particles") };
@@ -97,9 +123,68 @@ fn rows(name: &str, spec: &ModelSpec, options: &Options) -> Result<()> {
             start_position_m: place.finger_m(-GAP_M, 0.0),
         }];
         let model = Model::build(spec).into_diagnostic()?;
-        println!("| {name} | {awake} | {} | {} |", model.substeps(), Session::new(&model, place).run()?);
+        keep(Session::new(&model, place).run(name, awake)?);
     }
     Ok(())
+}
+
+/// What the ticks of a heart take (µs).
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeartTicks {
+    /// Its name, or what it was made of.
+    pub name: String,
+    /// Most particles awake.
+    pub awake: usize,
+    /// Substeps of a tick.
+    pub substeps: u32,
+    /// Median at rest, awake.
+    pub rest_us: f64,
+    /// Median, p99 and longest while the finger is dragged.
+    pub dragged_us: [f64; 3],
+    /// Substeps of a tick in the mean while it is dragged.
+    pub substeps_taken: f64,
+    /// Force (N) on the finger in the mean while it is dragged.
+    pub mean_force_n: f64,
+    /// Median after the finger has left.
+    pub swaying_us: f64,
+    /// `None` where it never falls asleep.
+    pub asleep: Option<Asleep>,
+}
+
+/// What the ticks of a heart take once it sleeps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asleep {
+    /// How long (s) after the finger had left it fell asleep.
+    pub after_s: f64,
+    /// Median (µs).
+    pub median_us: f64,
+    /// 99th percentile (µs).
+    pub p99_us: f64,
+}
+
+impl fmt::Display for Asleep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} s, {:.1}, {:.1}", self.after_s, self.median_us, self.p99_us)
+    }
+}
+
+/// A row of the table that is printed.
+impl fmt::Display for HeartTicks {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [median, p99, longest] = self.dragged_us;
+        write!(
+            f,
+            "| {} | {} | {} | {:.1} | {median:.0}, {p99:.0}, {longest:.0} | {:.1} | {:.3} N | {:.0} | {} |",
+            self.name,
+            self.awake,
+            self.substeps,
+            self.rest_us,
+            self.substeps_taken,
+            self.mean_force_n,
+            self.swaying_us,
+            self.asleep.map_or_else(|| "never".to_owned(), |asleep| asleep.to_string())
+        )
+    }
 }
 
 /// Where a heart is pressed.
@@ -178,8 +263,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The rest of the row.
-    fn run(mut self) -> Result<String> {
+    fn run(mut self, name: &str, awake: usize) -> Result<HeartTicks> {
         let step_m = SPEED_M_PER_S * self.model.settings().tick_period_s;
         let mut rest_s = Vec::new();
         for _ in 0..REST_TICKS {
@@ -201,7 +285,7 @@ impl<'a> Session<'a> {
             dragged_s.push(self.tick(DEPTH_M, dragged_m)?);
             force_n += self.state.mechanical.tools[0].contact_force_n.length() / f64::from(DRAG_TICKS);
         }
-        let substeps = self.substeps as f64 / f64::from(DRAG_TICKS);
+        let substeps_taken = self.substeps as f64 / f64::from(DRAG_TICKS);
         for tick in 0..way + LEAVES_TICKS {
             self.tick((DEPTH_M - f64::from(tick) * step_m).max(-GAP_M), dragged_m)?;
         }
@@ -214,17 +298,21 @@ impl<'a> Session<'a> {
         let [rest] = quantiles(&mut rest_s, [0.5]);
         let [median, p99, longest] = quantiles(&mut dragged_s, [0.5, 0.99, 1.0]);
         let [swaying] = quantiles(&mut swaying_s, [0.5]);
-        Ok(format!(
-            "{:.1} | {:.0}, {:.0}, {:.0} | {substeps:.1} | {force_n:.3} N | {:.0} | {}",
-            1e6 * rest,
-            1e6 * median,
-            1e6 * p99,
-            1e6 * longest,
-            1e6 * swaying,
-            asleep.map_or("never".to_owned(), |(at, [median, p99])| {
-                format!("{:.1} s, {:.1}, {:.1}", 1e-3 * (at - left) as f64, 1e6 * median, 1e6 * p99)
-            })
-        ))
+        Ok(HeartTicks {
+            name: name.to_owned(),
+            awake,
+            substeps: self.model.substeps(),
+            rest_us: 1e6 * rest,
+            dragged_us: [1e6 * median, 1e6 * p99, 1e6 * longest],
+            substeps_taken,
+            mean_force_n: force_n,
+            swaying_us: 1e6 * swaying,
+            asleep: asleep.map(|(at, [median, p99])| Asleep {
+                after_s: 1e-3 * (at - left) as f64,
+                median_us: 1e6 * median,
+                p99_us: 1e6 * p99,
+            }),
+        })
     }
 
     /// Waits for the heart to fall asleep. Returns when it did (ticks), and the median and p99 of what its ticks take then (s); `None`

@@ -47,13 +47,13 @@ impl Hybrid {
     pub(super) fn variants() -> Vec<Self> {
         let of = |(lattice, active): (Lattice, usize)| {
             let (name, cells) = match lattice {
-                Lattice::Same => ("hybrid", "cells"),
-                Lattice::Smooth => ("hybrid smooth", "cells, a skin that follows means of particles"),
-                Lattice::Doubled => ("hybrid doubled", "cells, deeper down twice as large"),
-                Lattice::Halved => ("hybrid halved", "cells, at the surface half as large"),
+                Lattice::Same => ("", "cells"),
+                Lattice::Smooth => (" smooth skin", "cells, a skin that follows means of particles"),
+                Lattice::Doubled => (" doubled below", "cells, deeper down twice as large"),
+                Lattice::Halved => (" halved above", "cells, at the surface half as large"),
             };
             Self {
-                name: format!("{name} {active}"),
+                name: format!("hybrid {active} awake{name}"),
                 what: format!(
                     "Composite coarse tets and {active} active particles at most on a lattice ({cells}), as tools and loads wake them, explicit leapfrog, forces in f32."
                 ),

@@ -25,42 +25,42 @@ impl Tetrahedra {
         let stvk = |convention| Some((Law::StVenantKirchhoff, convention));
         vec![
             Self {
-                name: super::DEFAULT,
-                what: "The default: the problem's law, explicit leapfrog, forces in f32.",
+                name: super::LINEAR_TETS,
+                what: "Linear tetrahedra with the problem's law, explicit leapfrog, forces in f32.",
                 law: None,
                 elements: TetElements::Linear,
                 settings: Settings::default,
             },
             Self {
-                name: "smoothed tets",
-                what: "The same with most of the strain averaged around nodes.",
+                name: super::SMOOTHED_TETS,
+                what: "The same with most of the strain averaged around nodes: what scenes of tets alone get when they ask for nothing else.",
                 law: None,
                 elements: TetElements::Smoothed,
                 settings: Settings::default,
             },
             Self {
-                name: "leapfrog f64",
-                what: "The default with forces in f64.",
+                name: "linear tets in f64",
+                what: "Linear tetrahedra with forces in f64.",
                 law: None,
                 elements: TetElements::Linear,
                 settings: double,
             },
             Self {
-                name: "seed Verlet",
+                name: "papers' Verlet",
                 what: "The seeds' position Verlet (2006, eq. 33) with the problem's law: leapfrog's positions, velocities half a step ahead.",
                 law: None,
                 elements: TetElements::Linear,
                 settings: || Settings { integrator: Integrator::SeedVerlet, ..Settings::default() },
             },
             Self {
-                name: "seed semi-implicit",
+                name: "papers' semi-implicit Euler",
                 what: "The seeds' semi-implicit Euler with nodewise Jacobian (eq. 34) with the problem's law, at leapfrog's substeps.",
                 law: None,
                 elements: TetElements::Linear,
                 settings: || Settings { integrator: Integrator::SeedSemiImplicit, ..Settings::default() },
             },
             Self {
-                name: "seed semi-implicit once",
+                name: "papers' semi-implicit Euler once a tick",
                 what: "The same in one step per tick, as the 2006 paper takes it, stable or not.",
                 law: None,
                 elements: TetElements::Linear,
@@ -79,7 +79,7 @@ impl Tetrahedra {
                 settings: || Settings { integrator: Integrator::BackwardEuler, ..Settings::default() },
             },
             Self {
-                name: "backward Euler loose",
+                name: "backward Euler to a tenth",
                 what: "The same to a tenth.",
                 law: None,
                 elements: TetElements::Linear,
@@ -90,7 +90,7 @@ impl Tetrahedra {
                 },
             },
             Self {
-                name: "StVK as in 2006",
+                name: "papers' law of 2006",
                 what: "The seeds' St. Venant-Kirchhoff law with the elastic factor that the 2006 paper prints (half of the consistent \
                        one), by leapfrog in f32.",
                 law: stvk(Convention::Paper2006),
@@ -98,7 +98,7 @@ impl Tetrahedra {
                 settings: Settings::default,
             },
             Self {
-                name: "StVK as in 2005",
+                name: "papers' law of 2005",
                 what: "The same law with the 2005 paper's factors, which are consistent, by leapfrog in f32.",
                 law: stvk(Convention::Paper2005),
                 elements: TetElements::Linear,

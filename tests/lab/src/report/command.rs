@@ -1,10 +1,11 @@
 //! `palpate-lab run`.
 use super::{
     page::{self, Results},
-    peers,
+    peers, verdict,
 };
 use crate::{
     convergence,
+    hearts::{self, HeartTicks},
     machine::{Machine, Noise},
     measure::{self, Effort, Run, Turn},
     methods,
@@ -55,9 +56,9 @@ pub struct Options {
     peers_env: Option<PathBuf>,
 }
 
-/// Methods of a quick run: of hybrids two.
+/// Methods of a quick run: of hybrids three.
 fn is_quick_method(name: &str) -> bool {
-    !name.starts_with("hybrid") || ["hybrid 200", "hybrid 600"].contains(&name)
+    !name.starts_with("hybrid") || ["hybrid 200 awake", "hybrid 600 awake", methods::SERVED].contains(&name)
 }
 
 /// Problems of a quick run: most of those of rubber-like tissue, and the beam; with peers theirs too.
@@ -136,6 +137,7 @@ pub fn run(options: &Options) -> Result<()> {
     // Whoever asks for one problem or method wants its rows, not a minute of what concerns none in particular.
     let whole = options.problem.is_none() && options.method.is_empty();
     let convergence = if whole { convergence::all()? } else { vec![] };
+    let hearts = if whole { hearts(options, &bar)? } else { vec![] };
     let (skips, stress) = if whole { (skips(options, &bar)?, stress(options, &bar)?) } else { (vec![], vec![]) };
     bar.finish_and_clear();
     run.circumstances.extend(peers.notes);
@@ -144,6 +146,7 @@ pub fn run(options: &Options) -> Result<()> {
         problems: &problems,
         methods: &methods,
         convergence: &convergence,
+        hearts: &hearts,
         skips: &skips,
         stress: &stress,
     };
@@ -155,6 +158,9 @@ pub fn run(options: &Options) -> Result<()> {
         println!("{} by {} at {}: {}", row.problem, row.method, row.resolution, row.failure);
     }
     for sentence in peers::sentences(&run.rows) {
+        println!("{sentence}");
+    }
+    for sentence in verdict::sentences(&page::verdicts(&run, &problems)?) {
         println!("{sentence}");
     }
     println!("{} rows; read {}", run.rows.len(), options.out.join("report.html").display());
@@ -192,6 +198,14 @@ fn circumstances(options: &Options, effort: &Effort, noise: &Noise) -> BTreeMap<
     ]
     .map(|(key, value)| (key.to_owned(), value))
     .into()
+}
+
+/// Of a quick run the shipped one, else five more.
+fn hearts(options: &Options, bar: &ProgressBar) -> Result<Vec<HeartTicks>> {
+    bar.set_prefix("hearts");
+    bar.set_message("hybrid-ventricle");
+    let options = hearts::Options::of(if options.quick { 0 } else { 5 });
+    hearts::measure(&options, &mut |ticks| bar.set_message(format!("after {} {}", ticks.name, ticks.awake)))
 }
 
 fn skips(options: &Options, bar: &ProgressBar) -> Result<Vec<(Skip, Found)>> {

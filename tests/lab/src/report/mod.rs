@@ -2,11 +2,13 @@
 mod command;
 mod compare;
 mod convergence;
+mod hearts;
 mod page;
 mod peers;
 pub(crate) mod plot;
 mod skips;
 mod stress;
+mod verdict;
 
 pub use command::{Options, run};
 pub use compare::{Options as CompareOptions, compare, run as run_compare};

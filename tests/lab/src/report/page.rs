@@ -1,13 +1,15 @@
 //! The page: one file that needs nothing else, for a reader who was not there.
 use super::{
-    convergence, peers,
+    convergence, hearts, peers,
     plot::{self, Across, Point, Series},
     skips, stress,
+    verdict::{self, Verdict},
 };
 use crate::{
     convergence::Convergence,
-    measure::{Row, Run, TIE_ERROR},
-    methods::{self, Method},
+    hearts::HeartTicks,
+    measure::{Row, Run},
+    methods::Method,
     problems::{Action, Problem},
     references::Reference,
     skips::{Found, Skip},
@@ -21,6 +23,18 @@ pub(crate) const COLOURS: [&str; 16] = [
     "#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#cc79a7", "#7a5195", "#222222", "#8c6d31", "#17becf",
     "#a1d34c", "#999999", "#8b0000", "#b39ddb", "#004d40", "#f781bf",
 ];
+
+/// A colour for each of as many methods as there may be, no two alike: the first are those above, others go around the circle of hues by the
+/// golden angle, in three shades.
+fn colour(index: usize) -> String {
+    COLOURS.get(index).map_or_else(
+        || {
+            let (hue, lightness) = ((index as f64 * 137.508) % 360.0, [35, 50, 65][index % 3]);
+            format!("hsl({hue:.0} 70% {lightness}%)")
+        },
+        |colour| (*colour).to_owned(),
+    )
+}
 
 /// The look of all pages.
 pub(crate) const STYLE: &str = "
@@ -45,6 +59,8 @@ pub(super) struct Results<'a> {
     /// Empty: not computed.
     pub(super) convergence: &'a [Convergence],
     /// Empty: not measured.
+    pub(super) hearts: &'a [HeartTicks],
+    /// Empty: not measured.
     pub(super) skips: &'a [(Skip, Found)],
     /// Empty: not run.
     pub(super) stress: &'a [(StressRow, Outcome)],
@@ -60,8 +76,8 @@ pub(super) fn page(results: &Results<'_>) -> Result<String> {
         "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
          <title>Palpate: run time against error</title><style>{STYLE}</style><body><h1>Run time against error</h1>"
     );
+    verdict::section(&mut out, &verdicts(run, problems)?);
     introduction(&mut out, run);
-    summary(&mut out, run, problems);
     convergence::section(&mut out, results.convergence);
     out.push_str(
         "<h2>Methods</h2><p>The seeds are the two papers on hybrid deformable models for haptics, of 2005 and 2006, that Palpate sets out from; \
@@ -76,6 +92,7 @@ pub(super) fn page(results: &Results<'_>) -> Result<String> {
     for problem in *problems {
         section(&mut out, run, problem, methods)?;
     }
+    hearts::section(&mut out, results.hearts);
     skips::section(&mut out, results.skips);
     stress::section(&mut out, results.stress, run)?;
     out.push_str("</body></html>");
@@ -84,7 +101,7 @@ pub(super) fn page(results: &Results<'_>) -> Result<String> {
 
 fn introduction(out: &mut String, run: &Run) {
     out.push_str(
-        "<p>A haptic body must be computed once every millisecond, and what the hand feels should be right. This page shows, for every \
+        "<h2>What is shown</h2><p>A haptic body must be computed once every millisecond, and what the hand feels should be right. This page shows, for every \
          method that Palpate has, how long one such tick takes and how far its answer is off, on problems whose answer is known: by \
          formula, or from a converged solution on elements of second order that share nothing with the methods but the material's \
          energy.</p><p><b>How to read the plots.</b> Each point is a method at one resolution: further left is faster, further down \
@@ -112,51 +129,17 @@ fn rows_of<'a>(run: &'a Run, problem: &Problem) -> Vec<&'a Row> {
     run.rows.iter().filter(|row| row.problem == problem.name).collect()
 }
 
-/// Which method wins at 1 ms, and whether the default lies on the front.
-fn summary(out: &mut String, run: &Run, problems: &[Problem]) {
-    out.push_str(
-        "<h2>At a millisecond</h2><p>For each problem the smallest error that fits into a tick (median below 1 ms; what the machine adds at its worst is in the tables and in the line on noise above), by the \
-         fastest that has it to within 1 %, and what the default method reaches. Resolutions are cells or tets, as in the tables below. On the front means: \
-         among all points within the millisecond some point of the default, at whatever resolution, is beaten by no other method.</p><p>Most of these errors are \
-         large, and nearly all of them the mesh's: linear tetrahedra of nearly incompressible tissue are far too stiff (they lock), and a mesh that fits into \
-         a millisecond is coarse beneath a small tool. All methods on tetrahedra share that; they differ in time.</p>\
-         <div class=\"wide\"><table><tr><th>problem</th><th>smallest error</th><th>by</th><th>resolution</th><th>µs</th>\
-         <th>default's error</th><th>resolution</th><th>µs</th><th>default on the front</th></tr>",
-    );
-    for problem in problems {
-        let rows: Vec<&Row> = rows_of(run, problem)
-            .into_iter()
-            .filter(|r| r.is_in_competition() && r.median_us.is_some_and(|t| t < 1000.0))
-            .collect();
-        let defaults: Vec<&Row> = rows.iter().copied().filter(|r| r.method == methods::DEFAULT).collect();
-        let on_front = defaults.iter().any(|r| r.is_on_front(&rows));
-        let (Some(winner), Some(default)) = (best(&rows), best(&defaults)) else {
-            let _ = write!(out, "<tr><td>{}</td><td colspan=\"8\">nothing fits</td></tr>", escape(&problem.name));
-            continue;
-        };
-        let _ = write!(
-            out,
-            "<tr><td><a href=\"#{0}\">{0}</a></td><td>{1}</td><td>{2}</td><td>{3}</td><td>{4}</td><td>{5}</td><td>{6}</td><td>{7}</td>{8}</tr>",
-            escape(&problem.name),
-            percent(winner.answer_error),
-            escape(&winner.method),
-            winner.resolution,
-            number(winner.median_us, 1),
-            percent(default.answer_error),
-            default.resolution,
-            number(default.median_us, 1),
-            if on_front { "<td class=\"yes\">yes</td>" } else { "<td class=\"no\">no</td>" }
-        );
-    }
-    out.push_str("</table></div>");
-}
-
-/// The smallest error's, by the fastest that ties with it.
-fn best<'a>(rows: &[&'a Row]) -> Option<&'a Row> {
-    let error = |row: &Row| row.error().unwrap_or(f64::INFINITY);
-    let smallest = rows.iter().copied().map(error).fold(f64::INFINITY, f64::min);
-    let ties = rows.iter().copied().filter(|row| row.error().is_some_and(|e| e <= (1.0 + TIE_ERROR) * smallest));
-    ties.min_by(|a, b| a.median_us.unwrap_or(f64::INFINITY).total_cmp(&b.median_us.unwrap_or(f64::INFINITY)))
+/// What is nearest within a millisecond, problem by problem.
+///
+/// # Errors
+/// A problem without reference.
+pub(super) fn verdicts<'a>(run: &'a Run, problems: &'a [Problem]) -> Result<Vec<Verdict<'a>>> {
+    let of = |problem: &'a Problem| {
+        let reference = Reference::of(problem)?;
+        let floor = reference.uncertainty / reference.value.abs();
+        Ok(Verdict::of(&problem.name, floor, &rows_of(run, problem)))
+    };
+    problems.iter().map(of).collect()
 }
 
 fn section(out: &mut String, run: &Run, problem: &Problem, methods: &[Box<dyn Method>]) -> Result<()> {
@@ -178,8 +161,9 @@ fn section(out: &mut String, run: &Run, problem: &Problem, methods: &[Box<dyn Me
     );
     let mut series = Vec::new();
     out.push_str("<div class=\"legend\">");
-    for (index, name) in names(run, methods).into_iter().enumerate() {
-        let colour = COLOURS[index % COLOURS.len()];
+    let names = names(run, methods);
+    let colours: Vec<String> = (0..names.len()).map(colour).collect();
+    for (name, colour) in names.into_iter().zip(&colours) {
         let of_method = rows.iter().filter(|row| row.method == name);
         let points: Vec<Point> = of_method.filter_map(|row| point(row, &rows)).collect();
         if !points.is_empty() {
@@ -276,14 +260,20 @@ pub(super) fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::problems;
+    use crate::{methods, problems};
+
+    #[test]
+    fn no_two_methods_have_the_same_colour() {
+        let colours: std::collections::BTreeSet<String> = (0..64).map(colour).collect();
+        assert!(colours.len() == 64 && methods::all().len() < 48);
+    }
 
     #[test]
     fn a_page_is_one_file_and_shows_failures() {
         let problem = problems::all().into_iter().find(|p| p.name == "lame-nu0.45").unwrap();
         let good = Row {
             problem: problem.name.clone(),
-            method: methods::DEFAULT.into(),
+            method: methods::SMOOTHED_TETS.into(),
             competes: true,
             median_us: Some(10.0),
             p99_us: Some(11.0),
@@ -304,6 +294,7 @@ mod tests {
             problems: &[problem],
             methods: &methods::all(),
             convergence: &[study],
+            hearts: &[],
             skips: &[],
             stress: &[],
         };

@@ -11,7 +11,7 @@ use crate::{
 };
 use std::fmt::Write as _;
 
-/// A peer has solved a mesh's equations if its answer is this near to our default method's on that mesh, which is their equilibrium. Laws that
+/// A peer has solved a mesh's equations if its answer is this near to our linear tets' on that mesh, which is their equilibrium. Laws that
 /// are alike to first order differ by up to half of this on the problems that peers are given.
 const SOLVED: f64 = 0.02;
 
@@ -23,8 +23,8 @@ pub(super) struct Beside<'a> {
     pub off_mesh: Option<f64>,
     /// The fastest of ours that solved the same mesh's equations, if the peer did.
     pub on_mesh: Option<&'a Row>,
-    /// Our default method on that mesh, if the peer solved its equations.
-    pub default_on_mesh: Option<&'a Row>,
+    /// Our linear tets on that mesh, if the peer solved its equations.
+    pub tets_on_mesh: Option<&'a Row>,
     /// The fastest of ours, at any resolution, that is no farther from the reference.
     pub as_near: Option<&'a Row>,
 }
@@ -54,8 +54,8 @@ pub(super) fn beside(rows: &[Row]) -> Vec<Beside<'_>> {
 fn of<'a>(peer: &'a Row, ours: &[&'a Row]) -> Beside<'a> {
     let competing = || ours.iter().copied().filter(|row| row.problem == peer.problem && row.competes);
     let same_mesh = || competing().filter(|row| row.resolution == peer.resolution);
-    let default = same_mesh().find(|row| row.method == methods::DEFAULT);
-    let equilibrium = default.and_then(|row| row.answer);
+    let tets = same_mesh().find(|row| row.method == methods::LINEAR_TETS);
+    let equilibrium = tets.and_then(|row| row.answer);
     let off = |row: &Row| Some(row.answer? / equilibrium? - 1.0);
     let solved = |row: &Row| off(row).is_some_and(|off| off.abs() <= SOLVED);
     let error = peer.error().unwrap_or(0.0);
@@ -63,7 +63,7 @@ fn of<'a>(peer: &'a Row, ours: &[&'a Row]) -> Beside<'a> {
     Beside {
         peer,
         off_mesh: off(peer),
-        default_on_mesh: default.filter(|_| solved(peer)),
+        tets_on_mesh: tets.filter(|_| solved(peer)),
         on_mesh: if solved(peer) { fastest(same_mesh().filter(|row| solved(row))) } else { None },
         as_near: fastest(near),
     }
@@ -79,10 +79,10 @@ pub(super) fn sentences(rows: &[Row]) -> Vec<String> {
 }
 
 fn sentence(b: &Beside<'_>) -> Option<String> {
-    let (ours, default) = (b.on_mesh?, b.default_on_mesh?);
+    let (ours, tets) = (b.on_mesh?, b.tets_on_mesh?);
     Some(format!(
         "{} at {}: the fastest peer that solves the mesh's equations is {} with {} µs a tick (error {}, {} off the mesh's equilibrium); {} \
-         takes {} µs (error {}): {:.1} times less; {}, the default, {} µs: {:.1} times less",
+         takes {} µs (error {}): {:.1} times less; {} {} µs: {:.1} times less",
         b.peer.problem,
         b.peer.resolution,
         b.peer.method.trim_start_matches(PREFIX),
@@ -93,9 +93,9 @@ fn sentence(b: &Beside<'_>) -> Option<String> {
         number(ours.median_us, 1),
         percent(ours.answer_error),
         b.times_less(Some(ours))?,
-        default.method,
-        number(default.median_us, 1),
-        b.times_less(Some(default))?
+        tets.method,
+        number(tets.median_us, 1),
+        b.times_less(Some(tets))?
     ))
 }
 
@@ -131,7 +131,7 @@ pub(super) fn section(out: &mut String, run: &Run) {
     }
     out.push_str(
         "</ul><div class=\"wide\"><table><tr><th>problem</th><th>peer</th><th>at</th><th>steps</th><th>µs</th><th>error</th>\
-         <th>off the mesh's equilibrium</th><th>our fastest on this mesh, µs</th><th>times less</th><th>our default, µs</th><th>times less</th>\
+         <th>off the mesh's equilibrium</th><th>our fastest on this mesh, µs</th><th>times less</th><th>our linear tets, µs</th><th>times less</th>\
          <th>ours as near, at</th><th>µs</th><th>times less</th></tr>",
     );
     for b in beside(&run.rows) {
@@ -147,8 +147,8 @@ pub(super) fn section(out: &mut String, run: &Run) {
             percent(b.off_mesh),
             number(b.on_mesh.and_then(|row| row.median_us), 1),
             number(b.times_less(b.on_mesh), 1),
-            number(b.default_on_mesh.and_then(|row| row.median_us), 1),
-            number(b.times_less(b.default_on_mesh), 1)
+            number(b.tets_on_mesh.and_then(|row| row.median_us), 1),
+            number(b.times_less(b.tets_on_mesh), 1)
         );
         let _ = match b.as_near {
             Some(ours) => write!(
@@ -185,8 +185,8 @@ mod tests {
     #[test]
     fn a_peer_is_compared_on_its_mesh_and_against_the_reference() {
         let rows = [
-            row(methods::DEFAULT, 1, 10.0, -0.5),
-            row(methods::DEFAULT, 2, 40.0, -0.2),
+            row(methods::LINEAR_TETS, 1, 10.0, -0.5),
+            row(methods::LINEAR_TETS, 2, 40.0, -0.2),
             row("slow", 2, 80.0, -0.199),
             row("quick", 2, 20.0, -0.2),
             Row { competes: false, ..row("unfair", 1, 1.0, 0.0) },
@@ -198,8 +198,8 @@ mod tests {
         let all = beside(&rows);
         let on_mesh: Vec<_> = all.iter().map(|b| b.times_less(b.on_mesh)).collect();
         assert_eq!(on_mesh, [Some(20.0), Some(30.0), None, None]);
-        let default: Vec<_> = all.iter().map(|b| b.times_less(b.default_on_mesh)).collect();
-        assert_eq!(default, [Some(10.0), Some(15.0), None, None]);
+        let tets: Vec<_> = all.iter().map(|b| b.times_less(b.tets_on_mesh)).collect();
+        assert_eq!(tets, [Some(10.0), Some(15.0), None, None]);
         let as_near: Vec<_> = all.iter().map(|b| b.times_less(b.as_near)).collect();
         assert_eq!(as_near, [Some(20.0), None, None, Some(3.0)]);
         let lines = sentences(&rows);

@@ -34,10 +34,5 @@ pub(super) fn section(out: &mut String, found: &[(Skip, Found)]) {
 
 fn sameness(skip: &Skip, found: &Found) -> String {
     let class = if skip.is_kept(found) { "yes" } else { "no" };
-    let text = match skip.tolerance_m {
-        None if found.same_bits => "bit for bit".to_owned(),
-        None => format!("no, {:.1e} m apart", found.farthest_m),
-        Some(tolerance_m) => format!("within {:.1e} m (allowed {tolerance_m:.0e} m)", found.farthest_m),
-    };
-    format!("<td class=\"{class}\">{text}</td>")
+    format!("<td class=\"{class}\">{}</td>", skip.sameness(found))
 }

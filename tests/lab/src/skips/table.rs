@@ -1,6 +1,31 @@
-//! `skips.csv`: one line per skip.
-use super::{ELSEWHERE, Found, Skip};
+//! The tables of what was found: `skips.csv`, and the one that is printed.
+use super::{ALL, ELSEWHERE, Found, Skip};
+use miette::{Result, WrapErr};
 use std::fmt::Write as _;
+
+/// Ticks that are timed.
+const ROUNDS: usize = 1_000;
+
+/// Measures every skip and prints a line for each.
+pub fn print() -> Result<()> {
+    println!("Ticks of 1 ms, in microseconds (medians), with a skip and without, in turns.\n");
+    println!("| skip | left out | scene | with | without | saved | how far apart |");
+    println!("|---|---|---|---|---|---|---|");
+    for skip in ALL {
+        let found = (skip.run)(ROUNDS).wrap_err_with(|| format!("the skip \"{}\" was not measured", skip.name))?;
+        println!(
+            "| {} | {} | {} | {:.1} | {:.1} | {:.0} % | {} |",
+            skip.name,
+            skip.what,
+            skip.scene,
+            found.with.median_s * 1e6,
+            found.without.median_s * 1e6,
+            100.0 * found.saved(),
+            skip.sameness(&found)
+        );
+    }
+    Ok(())
+}
 
 /// The table of what was found; skips that are not measured have a reason instead of numbers.
 pub fn csv(found: &[(Skip, Found)]) -> String {
