@@ -5,6 +5,7 @@ pub mod deep;
 pub mod fine_levels;
 pub mod hashes;
 pub mod hearts;
+pub mod in_time;
 pub mod jitter;
 pub mod locking;
 pub mod machine;

@@ -1,7 +1,7 @@
 //! `palpate-lab`: run time beside error.
 use clap::{Parser, Subcommand};
 use palpate_lab::{
-    deep, fine_levels, hashes, hearts, jitter, locking, references, report, ripple, skips, stress, subdivision,
+    deep, fine_levels, hashes, hearts, in_time, jitter, locking, references, report, ripple, skips, stress, subdivision,
 };
 
 #[derive(Parser)]
@@ -45,6 +45,8 @@ enum Command {
     Ripple,
     /// What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it
     Hearts(hearts::Options),
+    /// How far bodies are off in time: their natural frequencies, and how stiff they are under a patch that swings, by frequency: a minute
+    InTime,
     /// What a tick takes with each thing left out that a scene does not need, and without: a minute
     Skips,
     /// Makes the two surfaces of the heart that is shipped (deploy/scenes/heart.toml)
@@ -67,6 +69,7 @@ fn main() -> miette::Result<()> {
         Command::Deep(options) => deep::print(&options),
         Command::Ripple => ripple::print(),
         Command::Hearts(options) => hearts::print(&options),
+        Command::InTime => in_time::print(),
         Command::Skips => skips::print(),
         Command::HeartSurfaces(options) => hearts::write_shipped(&options),
         Command::Hashes(options) => hashes::run(&options),

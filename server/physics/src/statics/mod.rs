@@ -100,15 +100,17 @@ fn held(free: Option<FreePart>) -> Result<(), SolveError> {
     free.map_or(Ok(()), |part| Err(part.into()))
 }
 
-/// The `count` lowest natural modes of a body of tetrahedra about rest, ascending.
+/// The `count` lowest natural modes about rest, ascending, of a body of tetrahedra, or of the coarse level of one with
+/// particles, which all sleep.
 ///
 /// # Errors
 /// [`SolveError`]; other bodies have none that are known.
 pub fn natural_modes(model: &Model, count: usize) -> Result<Vec<Mode>, SolveError> {
-    let Some(body) = model.body().as_tet() else {
-        return Err(SolveError::NotForThisBody { what: "natural vibration", but: "" });
-    };
-    Ok(tet::natural_modes(body, model.surface(), count)?)
+    match model.body() {
+        Body::Tet(body) => Ok(tet::natural_modes(body, model.surface(), count)?),
+        Body::Hybrid(body) => Ok(body.sleeping_modes(count)?),
+        _ => Err(SolveError::NotForThisBody { what: "natural vibration", but: ", and of those with particles" }),
+    }
 }
 
 fn check(model: &Model, goal: &Goal<'_>, settings: &StaticSettings) -> Result<(), SolveError> {

@@ -4,7 +4,7 @@ use miette::{Result, miette};
 use std::{collections::BTreeMap, fmt::Write as _};
 
 const HEADER: &str = "problem,method,competes,resolution,elements,nodes,substeps,median_us,p99_us,worst_us,unrest,memory_bytes,answer,\
-                      answer_error,field_l2,field_max,drift,energy_error,failure";
+                      answer_error,field_l2,field_around,field_max,drift,energy_error,failure";
 
 /// A run: circumstances and rows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,7 +26,7 @@ pub fn write(run: &Run) -> String {
         let number = |value: Option<f64>| value.map_or(String::new(), |v| format!("{v:.6e}"));
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             row.problem,
             row.method,
             row.competes,
@@ -42,6 +42,7 @@ pub fn write(run: &Run) -> String {
             number(row.answer),
             number(row.answer_error),
             number(row.field_l2),
+            number(row.field_around),
             number(row.field_max),
             number(row.drift),
             number(row.energy_error),
@@ -93,7 +94,9 @@ fn parse(line: &str) -> Option<Row> {
     else {
         return None;
     };
-    let [answer, answer_error, field_l2, field_max, drift, energy_error, failure] = rest else { return None };
+    let [answer, answer_error, field_l2, field_around, field_max, drift, energy_error, failure] = rest else {
+        return None;
+    };
     let number = |field: &str| if field.is_empty() { Some(None) } else { field.parse().ok().map(Some) };
     Some(Row {
         problem: (*problem).into(),
@@ -111,6 +114,7 @@ fn parse(line: &str) -> Option<Row> {
         answer: number(answer)?,
         answer_error: number(answer_error)?,
         field_l2: number(field_l2)?,
+        field_around: number(field_around)?,
         field_max: number(field_max)?,
         drift: number(drift)?,
         energy_error: number(energy_error)?,

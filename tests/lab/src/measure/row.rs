@@ -42,6 +42,8 @@ pub struct Row {
     pub answer_error: Option<f64>,
     /// Displacement field against the reference's, relative L2.
     pub field_l2: Option<f64>,
+    /// The same around what is pressed alone, where there is such a part.
+    pub field_around: Option<f64>,
     /// The same in the maximum.
     pub field_max: Option<f64>,
     /// Change of the answer over the last ticks, over the answer: how far it still moves.

@@ -155,6 +155,7 @@ fn answered(row: Row, last: &[f64], samples: &[Sample], displacements_m: &[DVec3
         answer: Some(answer),
         answer_error: Some(answer / reference.value - 1.0),
         field_l2: field.map(|f| f.l2),
+        field_around: field.and_then(|f| f.around_l2),
         field_max: field.map(|f| f.max),
         drift: Some(spread / answer.abs()),
         ..row

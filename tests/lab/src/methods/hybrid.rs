@@ -108,10 +108,26 @@ impl Method for Hybrid {
     }
 
     fn build(&self, problem: &Problem, resolution: u32, pace: &Pace) -> Result<Box<dyn Running>> {
+        let HybridSubject { model, tool, load, fine } = self.subject(problem, resolution, pace.damping_per_s)?;
+        let probe = Probe::new(&fine, &sample::points(problem.body));
+        Ok(Box::new(Pressed::new(model, tool, load, (fine, probe))))
+    }
+}
+
+/// A hybrid body, what acts on it, and the fine mesh whose boundary is its skin.
+struct HybridSubject {
+    model: Model,
+    tool: Option<Tool>,
+    load: Option<NodalLoad>,
+    fine: TetBody,
+}
+
+impl Hybrid {
+    fn subject(&self, problem: &Problem, resolution: u32, mass_damping_per_s: f64) -> Result<HybridSubject> {
         let Fineness { spacing_m, fine_depth_m, skin } =
             self.fineness(problem).ok_or_else(|| miette!("the {} has no particles", problem.body.name()))?;
         let (coarse, fine) = (problem.body.tets(resolution)?, problem.body.tets(skin)?);
-        let settings = Settings { mass_damping_per_s: pace.damping_per_s, ..Settings::for_particles() };
+        let settings = Settings { mass_damping_per_s, ..Settings::for_particles() };
         let smooth_skin = matches!(self.lattice, Lattice::Smooth);
         let particles = ParticleSpec {
             fine_depth_m,
@@ -138,10 +154,14 @@ impl Method for Hybrid {
             _ => None,
         };
         spec.tools = tool.iter().map(Tool::spec).collect();
-        let model = Model::build(spec).into_diagnostic()?;
-        let probe = Probe::new(&fine, &sample::points(problem.body));
-        Ok(Box::new(Pressed::new(model, tool, load, (fine, probe))))
+        Ok(HybridSubject { model: Model::build(spec).into_diagnostic()?, tool, load, fine })
     }
+}
+
+/// Returns a problem's body with particles, of which none is awake.
+pub(crate) fn asleep(problem: &Problem, resolution: u32) -> Result<Model> {
+    let hybrid = Hybrid::variants().into_iter().next().ok_or_else(|| miette!("there is no method with particles"))?;
+    Ok(hybrid.subject(problem, resolution, 0.0)?.model)
 }
 
 /// Particles in a body whose skin is the boundary of a fine mesh, woken by hand.

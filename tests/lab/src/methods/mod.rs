@@ -18,7 +18,7 @@ mod testing;
 mod tetrahedra;
 mod xpbd;
 
-pub(crate) use hybrid::{nearest, particles};
+pub(crate) use hybrid::{asleep, nearest, particles};
 pub use pace::{Pace, tremor};
 pub(crate) use subject::Subject;
 pub(crate) use subject::tet_body;

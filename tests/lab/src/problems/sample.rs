@@ -22,6 +22,8 @@ pub struct Sample {
     pub rest_m: DVec3,
     /// Its share of the area (m²).
     pub area_m2: f64,
+    /// Whether it is in the outer half of the pattern: around what is pressed, not beneath it.
+    pub is_around: bool,
     /// Its parameters on the reference grid's touched side, mirrored into the part that is modelled.
     pub parameters: [f64; 2],
     /// From displacements of the part that is modelled to those of the body: mirrored, and turned to where it is touched.
@@ -31,7 +33,7 @@ pub struct Sample {
 /// The points of a body; none for beams.
 pub fn points(body: Body) -> Vec<Sample> {
     match body {
-        Body::Block => polar(REACH_M).map(|(a, b, area)| on_block(a, b, area)).collect(),
+        Body::Block => polar(REACH_M).map(on_block).collect(),
         Body::Ventricle(place) => on_ventricle(VENTRICLE_M, place, REACH_M),
         Body::SmallVentricle => on_ventricle(SMALL_VENTRICLE_M, Place::Side, SMALL_REACH_M),
         Body::Octant => on_octant(),
@@ -42,18 +44,29 @@ pub fn points(body: Body) -> Vec<Sample> {
 /// The pattern where there is body: it may reach past the cut.
 fn on_ventricle(ventricle: VentricleM, place: Place, reach_m: f64) -> Vec<Sample> {
     let on_body = |sample: &Sample| sample.rest_m.z < ventricle.2;
-    polar(reach_m).map(|(a, b, area)| at_ventricle(ventricle, place, [a, b], area)).filter(on_body).collect()
+    polar(reach_m).map(|offset| at_ventricle(ventricle, place, offset)).filter(on_body).collect()
 }
 
-/// Offsets (m) in the middles of the cells of a polar grid, with their areas (m²).
-fn polar(reach_m: f64) -> impl Iterator<Item = (f64, f64, f64)> {
+/// The middle of a cell of a polar grid.
+#[derive(Debug, Clone, Copy)]
+struct Offset {
+    /// Along both directions of the surface (m).
+    along_m: [f64; 2],
+    /// The cell's area (m²).
+    area_m2: f64,
+    is_around: bool,
+}
+
+/// The middles of the cells of a polar grid.
+fn polar(reach_m: f64) -> impl Iterator<Item = Offset> {
     let width = reach_m / f64::from(RINGS);
     (0..RINGS).flat_map(move |ring| {
         let r = width * (f64::from(ring) + 0.5);
         (0..SPOKES).map(move |spoke| {
             // Off the planes of symmetry, and every second ring turned.
             let angle = TAU * (f64::from(spoke) + 0.25 + 0.5 * f64::from(ring % 2)) / f64::from(SPOKES);
-            (r * angle.cos(), r * angle.sin(), TAU * r * width / f64::from(SPOKES))
+            let along_m = [r * angle.cos(), r * angle.sin()];
+            Offset { along_m, area_m2: TAU * r * width / f64::from(SPOKES), is_around: 2 * ring >= RINGS }
         })
     })
 }
@@ -62,10 +75,11 @@ fn sign(value: f64) -> f64 {
     if value < 0.0 { -1.0 } else { 1.0 }
 }
 
-fn on_block(x: f64, y: f64, area_m2: f64) -> Sample {
+fn on_block(Offset { along_m: [x, y], area_m2, is_around }: Offset) -> Sample {
     Sample {
         rest_m: DVec3::new(x, y, BLOCK_M[1]),
         area_m2,
+        is_around,
         parameters: [x.abs(), y.abs()],
         frame: mirror(sign(x), sign(y)),
     }
@@ -76,7 +90,8 @@ fn mirror(x: f64, y: f64) -> DMat3 {
 }
 
 /// Offsets along the parallel and the meridian, as long as where it is touched.
-fn at_ventricle((outer, _, cut): VentricleM, place: Place, [across, up]: [f64; 2], area_m2: f64) -> Sample {
+fn at_ventricle((outer, _, cut): VentricleM, place: Place, offset: Offset) -> Sample {
+    let Offset { along_m: [across, up], area_m2, is_around } = offset;
     let (meridian, touched) = (Meridian(outer), place.latitude_rad());
     // dA = short cosφ dθ · √(short² sin²φ + long² cos²φ) dφ
     let per_radians = |latitude: f64| [meridian.point_m(latitude).x, meridian.metres_per_radian(latitude)];
@@ -87,6 +102,7 @@ fn at_ventricle((outer, _, cut): VentricleM, place: Place, [across, up]: [f64; 2
     Sample {
         rest_m: place.turn() * DMat3::from_rotation_z(azimuth) * meridian.point_m(latitude),
         area_m2: area_m2 * stretch,
+        is_around,
         parameters: [azimuth.abs(), (latitude + FRAC_PI_2) / (top + FRAC_PI_2)],
         frame: place.turn() * mirror(1.0, sign(azimuth)),
     }
@@ -101,6 +117,7 @@ fn on_octant() -> Vec<Sample> {
         Sample {
             rest_m: direction * OCTANT_M[0],
             area_m2: (OCTANT_M[0] * step).powi(2) * latitude.cos(),
+            is_around: false,
             parameters: [azimuth, latitude],
             frame: DMat3::IDENTITY,
         }
@@ -142,6 +159,8 @@ impl Probe {
 pub struct FieldError {
     /// In L2 over the area.
     pub l2: f64,
+    /// The same around what is pressed, over the reference there; `None` where no sample is.
+    pub around_l2: Option<f64>,
     /// In the largest displacement.
     pub max: f64,
 }
@@ -152,12 +171,15 @@ impl FieldError {
         if samples.is_empty() || samples.len() != reference.len() {
             return None;
         }
-        let l2 = |of: &dyn Fn(usize) -> DVec3| {
-            samples.iter().enumerate().map(|(i, s)| s.area_m2 * of(i).length_squared()).sum::<f64>().sqrt()
+        let l2_where = |counts: &dyn Fn(&Sample) -> bool, of: &dyn Fn(usize) -> DVec3| {
+            let counted = samples.iter().enumerate().filter(|(_, s)| counts(s));
+            counted.map(|(i, s)| s.area_m2 * of(i).length_squared()).sum::<f64>().sqrt()
         };
         let max = |of: &dyn Fn(usize) -> DVec3| (0..samples.len()).map(|i| of(i).length()).fold(0.0, f64::max);
         let (difference, whole) = (|i: usize| found[i] - reference[i], |i: usize| reference[i]);
-        Some(Self { l2: l2(&difference) / l2(&whole), max: max(&difference) / max(&whole) })
+        let l2 = |counts: &dyn Fn(&Sample) -> bool| l2_where(counts, &difference) / l2_where(counts, &whole);
+        let around_l2 = samples.iter().any(|s| s.is_around).then(|| l2(&|s| s.is_around));
+        Some(Self { l2: l2(&|_| true), around_l2, max: max(&difference) / max(&whole) })
     }
 }
 
@@ -203,5 +225,21 @@ mod tests {
         let found = Probe::new(&body, &samples).displacements_m(rest, &x);
         let want: Vec<DVec3> = samples.iter().map(|s| linear(s.rest_m)).collect();
         assert!(FieldError::of(&samples, &found, &want).unwrap().max < 1e-12);
+    }
+
+    /// Half of the pattern's radius is a quarter of its area.
+    #[test]
+    fn an_error_around_the_contact_is_told_apart_from_one_beneath_it() {
+        let samples = points(Body::Block);
+        let around: f64 = samples.iter().filter(|s| s.is_around).map(|s| s.area_m2).sum();
+        assert!((around / (0.75 * PI * REACH_M * REACH_M) - 1.0).abs() < 1e-12);
+        let want = vec![DVec3::Z; samples.len()];
+        let off = |is_around: bool| -> Vec<DVec3> {
+            samples.iter().map(|s| if s.is_around == is_around { DVec3::Z * 1.1 } else { DVec3::Z }).collect()
+        };
+        let [beneath, around] = [false, true].map(|side| FieldError::of(&samples, &off(side), &want).unwrap());
+        assert!((beneath.l2 - 0.05).abs() < 1e-12 && beneath.around_l2 == Some(0.0), "{beneath:?}");
+        assert!((around.around_l2.unwrap() - 0.1).abs() < 1e-12, "{around:?}");
+        assert_eq!(FieldError::of(&points(Body::Octant), &[DVec3::Z; 144], &[DVec3::Z; 144]).unwrap().around_l2, None);
     }
 }

@@ -3,7 +3,7 @@
 //! Mass is integrated with the nodes as quadrature points (Gauss and Lobatto: 1/3, 4/3, 1/3 along each parameter), which makes it
 //! diagonal, positive, and of the elements' own order: `m_a = Σ_e ρ w_a det J_e(a)`. A step of dt is
 //! `x += ½dt v`, `v ← [(1 − ½α dt) v + dt f(x)/m]/(1 + ½α dt)`, `x += ½dt v`, of second order, with mass damping α.
-use super::{bodies::Body, shape, solid::Solid};
+use super::{bodies::Body, grid::HexGrid, shape, solid::Solid};
 use glam::{BVec3, DMat3, DVec3};
 use miette::{Result, ensure};
 use palpate_physics::linalg::tensor::outer;
@@ -41,19 +41,8 @@ impl<'a> Dynamics<'a> {
     /// # Errors
     /// A node without mass: where a grid's map collapses.
     pub fn new(solid: &'a Solid, body: &Body, density_kg_per_m3: f64) -> Result<Self> {
-        let grid = &solid.grid;
-        let element_masses_kg: Vec<[f64; 27]> = grid
-            .elements
-            .iter()
-            .map(|nodes| shares_m3(&nodes.map(|n| grid.positions_m[n as usize])).map(|v| v * density_kg_per_m3))
-            .collect();
-        let mut masses_kg = vec![0.0; grid.positions_m.len()];
-        for (nodes, masses) in grid.elements.iter().zip(&element_masses_kg) {
-            nodes.iter().zip(masses).for_each(|(&n, m)| masses_kg[n as usize] += m);
-        }
-        let least = element_masses_kg.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-        ensure!(least > 0.0, "a node of a reference grid has no mass: its map collapses there");
-        let rest = grid.positions_m.clone();
+        let (masses_kg, element_masses_kg) = masses_kg(&solid.grid, density_kg_per_m3)?;
+        let rest = solid.grid.positions_m.clone();
         Ok(Self {
             solid,
             v: vec![DVec3::ZERO; rest.len()],
@@ -90,6 +79,24 @@ impl<'a> Dynamics<'a> {
         let kinetic = self.masses_kg.iter().zip(&self.v).map(|(m, v)| 0.5 * m * v.length_squared()).sum::<f64>();
         kinetic + self.solid.energy_j(&self.x)
     }
+}
+
+/// Masses (kg) of the nodes, and each element's part of them.
+///
+/// # Errors
+/// A node without mass: where a grid's map collapses.
+pub(super) fn masses_kg(grid: &HexGrid, density_kg_per_m3: f64) -> Result<(Vec<f64>, Vec<[f64; 27]>)> {
+    let of_element = |nodes: &[u32; 27]| {
+        shares_m3(&nodes.map(|n| grid.positions_m[n as usize])).map(|volume_m3| volume_m3 * density_kg_per_m3)
+    };
+    let of_elements: Vec<[f64; 27]> = grid.elements.iter().map(of_element).collect();
+    let mut of_nodes = vec![0.0; grid.positions_m.len()];
+    for (nodes, masses) in grid.elements.iter().zip(&of_elements) {
+        nodes.iter().zip(masses).for_each(|(&n, m)| of_nodes[n as usize] += m);
+    }
+    let least = of_elements.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    ensure!(least > 0.0, "a node of a reference grid has no mass: its map collapses there");
+    Ok((of_nodes, of_elements))
 }
 
 /// Rest volume (m³) of an element's nodes.

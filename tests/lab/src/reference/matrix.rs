@@ -64,6 +64,12 @@ impl System {
     /// Solves `K u = f` on the free axes; `blocks` are the groups' symmetric matrices (N/m), row-major, `3m × 3m`. `None` when K is not
     /// positive definite.
     pub(super) fn solve(&mut self, blocks: &[Vec<f64>], forces_n: &[DVec3]) -> Option<Vec<DVec3>> {
+        self.factorise(blocks)?;
+        Some(self.solve_factorised(forces_n))
+    }
+
+    /// Factorises K, of blocks as in [`Self::solve`]. `None` when it is not positive definite.
+    pub(super) fn factorise(&mut self, blocks: &[Vec<f64>]) -> Option<()> {
         let mut values = Vec::with_capacity(self.entries);
         for (group, block) in self.groups.iter().zip(blocks) {
             let width = 3 * group.len();
@@ -81,7 +87,11 @@ impl System {
             stack,
             spec,
         );
-        factorised.ok()?;
+        factorised.ok().map(|_| ())
+    }
+
+    /// Solves `K u = f` on the free axes, with the K that was factorised last.
+    pub(super) fn solve_factorised(&mut self, forces_n: &[DVec3]) -> Vec<DVec3> {
         let mut right = vec![0.0; self.count];
         for (numbers, force) in self.number.iter().zip(forces_n) {
             for axis in (0..3).filter(|&axis| numbers[axis] != HELD) {
@@ -92,7 +102,7 @@ impl System {
         let columns = MatMut::from_column_major_slice_mut(&mut right, self.count, 1);
         factor.solve_in_place_with_conj(Conj::No, columns, Par::Seq, MemStack::new(&mut self.memory));
         let value = |n: usize| if n == HELD { 0.0 } else { right[n] };
-        Some(self.number.iter().map(|n| DVec3::new(value(n[0]), value(n[1]), value(n[2]))).collect())
+        self.number.iter().map(|n| DVec3::new(value(n[0]), value(n[1]), value(n[2]))).collect()
     }
 }
 

@@ -9,11 +9,12 @@
 //! - `shape.rs`: shape functions and quadrature
 //! - `solid.rs`: elastic forces and stiffness; `volume.rs`: volume's change, projected against locking
 //! - `sphere.rs`: a rigid sphere without friction, by a stiff penalty on the surface
-//! - `matrix.rs`, `ordering.rs`, `newton.rs`: the solve; `dynamics.rs`: motion in time
+//! - `matrix.rs`, `ordering.rs`, `newton.rs`: the solve; `dynamics.rs`: motion in time; `modes.rs`: natural modes
 pub mod bodies;
 pub mod dynamics;
 pub mod grid;
 mod matrix;
+pub mod modes;
 pub mod newton;
 mod ordering;
 pub mod shape;

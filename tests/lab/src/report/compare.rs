@@ -80,6 +80,7 @@ fn accuracy(found: &mut Comparison, name: &str, before: &Row, after: &Row, limit
     let kinds = [
         ("answer", before.error(), after.error()),
         ("field (L2)", before.field_l2, after.field_l2),
+        ("field (around, L2)", before.field_around, after.field_around),
         ("field (max)", before.field_max, after.field_max),
         ("energy", before.energy_error, after.energy_error),
     ];

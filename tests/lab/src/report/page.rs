@@ -114,7 +114,8 @@ fn introduction(out: &mut String, run: &Run) {
          damping near critical for the body's slowest mode, the same for every method; the answer is the mean over the last 20 ticks, and \
          the table says how far it still moves. In dynamic problems (a step, a sweep) the body rings under light damping instead; \
          the answer is compared at every tick, its error is the L2 norm in time of the difference over that of the reference (never negative: a \
-         phase that is lost weighs like a missing amplitude), and the table shows the root mean square as the answer. Then all methods of a problem take turns, one untimed tick to warm the caches and one timed, \
+         phase that is lost weighs like a missing amplitude), and the table shows the root mean square as the answer. Fields are the displacements of the surface within two radii of the sphere (10 mm) from where it touches; \
+         \"around\" counts the outer half of that radius alone, where a hand sees more than it feels. Then all methods of a problem take turns, one untimed tick to warm the caches and one timed, \
          so that a slow moment of the machine strikes all of them. A hand does not stand still, and solvers that begin where they were would have nothing \
          to do if it did: in these ticks tool or load trembles by 5 % at 8 Hz. The unrest of a row is how far the medians of the two halves of its turns are \
          apart: a problem whose rows have more than some 10 % should be run again on a quieter machine.</p><table class=\"text\">",
@@ -199,7 +200,7 @@ fn table(out: &mut String, problem: &Problem, rows: &[&Row]) {
         out,
         "<details><summary>Table</summary><div class=\"wide\"><table><tr><th>method</th><th>{}</th><th>elements</th><th>nodes</th>\
          <th>substeps</th><th>µs median</th><th>p99</th><th>worst</th><th>MB</th><th>answer ({})</th><th>error</th><th>field L2</th>\
-         <th>field max</th><th>energy</th><th>still moves</th></tr>",
+         <th>around L2</th><th>field max</th><th>energy</th><th>still moves</th></tr>",
         problem.body.resolution_unit(),
         problem.quantity().unit()
     );
@@ -216,7 +217,7 @@ fn table(out: &mut String, problem: &Problem, rows: &[&Row]) {
             let _ = write!(
                 out,
                 "<tr>{size}<td>{}</td><td>{}</td><td>{}</td><td>{:.2}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
-                 <td>{}</td></tr>",
+                 <td>{}</td><td>{}</td></tr>",
                 number(row.median_us, 1),
                 number(row.p99_us, 1),
                 number(row.worst_us, 1),
@@ -224,12 +225,13 @@ fn table(out: &mut String, problem: &Problem, rows: &[&Row]) {
                 row.answer.map_or_else(String::new, |a| format!("{a:.4e}")),
                 percent(row.answer_error),
                 percent(row.field_l2),
+                percent(row.field_around),
                 percent(row.field_max),
                 scientific(row.energy_error),
                 scientific(row.drift)
             );
         } else {
-            let _ = write!(out, "<tr>{size}<td colspan=\"10\" class=\"no\">{}</td></tr>", escape(&row.failure));
+            let _ = write!(out, "<tr>{size}<td colspan=\"11\" class=\"no\">{}</td></tr>", escape(&row.failure));
         }
     }
     out.push_str("</table></div></details>");

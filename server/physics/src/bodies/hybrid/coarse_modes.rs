@@ -11,7 +11,7 @@ use super::body::HybridBody;
 use crate::{
     elements::{
         free_axes::{FreeAxes, NONE},
-        natural_modes::{ModesError, lowest_modes},
+        natural_modes::{Mode, ModesError, lowest_modes},
     },
     linalg::cholesky::LowerTriangle,
 };
@@ -38,21 +38,33 @@ impl HybridBody {
     /// # Errors
     /// The coarse level is not held, or its lowest modes are not found.
     pub(super) fn coarse_modes(&self) -> Result<CoarseModes, ModesError> {
-        if let Some(part) = self.first_free_part() {
-            return Err(ModesError::UnderConstrained(part));
-        }
-        let free = self.inverse_mass_per_kg.iter().map(|inverse_mass| inverse_mass.cmpne(DVec3::ZERO));
-        let axes = FreeAxes::numbered(free);
-        let mut modes = lowest_modes(&self.coarse_stiffness(&axes), &axes, &self.masses.node_kg, MODES)?;
+        let mut modes = self.sleeping_modes(MODES)?;
         // Where none of them is felt, the lowest is as good as any, and nothing will be found at rest.
-        let first_felt = modes.iter().position(|mode| self.felt(&mode.shape_per_sqrt_kg) > UNFELT).unwrap_or_default();
+        let first_felt = modes
+            .iter()
+            .position(|mode| self.particles_kinetic_share(&mode.shape_per_sqrt_kg) > UNFELT)
+            .unwrap_or_default();
         let lowest_rad_per_s = modes.get(first_felt).map_or(f64::INFINITY, |mode| TAU * mode.frequency_hz);
         let unfelt = modes.drain(..first_felt).map(|mode| mode.shape_per_sqrt_kg).collect();
         Ok(CoarseModes { lowest_rad_per_s, unfelt })
     }
 
-    /// Returns `q` of a mode's shape (1/√kg).
-    fn felt(&self, shape_per_sqrt_kg: &[DVec3]) -> f64 {
+    /// Returns the `count` lowest modes of the coarse level, ascending, with the masses that are lumped on its nodes.
+    ///
+    /// # Errors
+    /// It is not held, or its lowest modes are not found.
+    pub(crate) fn sleeping_modes(&self, count: usize) -> Result<Vec<Mode>, ModesError> {
+        if let Some(part) = self.first_free_part() {
+            return Err(ModesError::UnderConstrained(part));
+        }
+        let free = self.inverse_mass_per_kg.iter().map(|inverse_mass| inverse_mass.cmpne(DVec3::ZERO));
+        let axes = FreeAxes::numbered(free);
+        lowest_modes(&self.coarse_stiffness(&axes), &axes, &self.masses.node_kg, count)
+    }
+
+    /// Returns `q` of a mode's shape (1/√kg): the kinetic energy of the particles, where the coarse nodes move so, over that
+    /// of the lumped masses. With the former, the mode's frequency would be nearly `1/√q` times as high.
+    pub fn particles_kinetic_share(&self, shape_per_sqrt_kg: &[DVec3]) -> f64 {
         let of_particle = |(particle, mass): (u32, &f64)| {
             mass * self.partition.anchor(particle).of(shape_per_sqrt_kg).length_squared()
         };
