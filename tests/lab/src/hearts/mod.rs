@@ -4,7 +4,9 @@
 //! its septum flat, its base no plane, muscles stand out into its cavity, and its surfaces are those of voxels. A seed
 //! decides all of it.
 mod anatomy;
+mod answers;
 mod isosurface;
+mod place;
 mod scene;
 mod shipped;
 mod ticks;

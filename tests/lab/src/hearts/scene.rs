@@ -15,7 +15,7 @@ const NOISE: f64 = 0.15;
 
 /// A heart.
 pub(crate) struct Heart {
-    /// What its model is built from; no tool is in it.
+    /// What its model is built from, particles in 400 coarse tets; no tool is in it.
     pub(crate) spec: ModelSpec,
     /// What is special about it, in words.
     pub(crate) told: String,
@@ -27,6 +27,14 @@ impl Heart {
     /// # Errors
     /// The folder for its files cannot be written, or the scene is refused.
     pub(crate) fn random(seed: u64) -> Result<Self> {
+        Self::of_tets(seed, 400, true)
+    }
+
+    /// Makes the heart of a seed in so many tets, which are all there is of it unless it has particles.
+    ///
+    /// # Errors
+    /// As of [`Self::random`].
+    pub(super) fn of_tets(seed: u64, target_tets: u32, has_particles: bool) -> Result<Self> {
         let mut random = Random::new(seed);
         let heart = Anatomy::random(&mut random);
         let voxel_m = random.within(2.1e-3, 2.4e-3);
@@ -41,9 +49,11 @@ impl Heart {
         write_obj(&folder.path().join("inner.obj"), &endocardium)?;
         let (spacing_m, poisson_ratio) = (random.within(3e-3, 3.6e-3), random.within(0.3, 0.49));
         let young_modulus_pa = random.log_within(8e3, 40e3);
+        let particles =
+            if has_particles { format!("[body.particles]\nspacing_m = {spacing_m}\n") } else { String::new() };
         let text = format!(
             "[scene]\nname = \"heart\"\n[body.surfaces]\ninner_file = \"inner.obj\"\nouter_file = \"outer.obj\"\nunit = \"mm\"\n\
-             target_tets = 400\n[body.particles]\nspacing_m = {spacing_m}\n[[material]]\nlaw = \"stable-neo-hookean\"\n\
+             target_tets = {target_tets}\n{particles}[[material]]\nlaw = \"stable-neo-hookean\"\n\
              young_modulus_pa = {young_modulus_pa}\npoisson_ratio = {poisson_ratio}\ndensity_kg_per_m3 = 1060\n\
              viscosity_psi_pa_s = 0.3\n[[fixed]]\nregion = \"base\"\n[numerics]\nmass_damping_per_s = 20\n"
         );

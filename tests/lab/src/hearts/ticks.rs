@@ -1,5 +1,8 @@
 //! What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it.
-use super::Heart;
+use super::{
+    Heart, answers,
+    place::{self, Place},
+};
 use crate::timing::quantiles;
 use clap::Args;
 use glam::DVec3;
@@ -13,8 +16,6 @@ use palpate_physics::{
 use palpate_scene::Limits;
 use std::{fmt, time::Instant};
 
-/// Radius (m) of the fingertip.
-const RADIUS_M: f64 = 6e-3;
 /// Depth (m) to which it presses.
 const DEPTH_M: f64 = 12e-3;
 /// How far (m) it starts from the heart.
@@ -36,7 +37,7 @@ const SWAY_TICKS: u32 = 300;
 pub(crate) fn what() -> String {
     format!(
         "Ticks of 1 ms, in microseconds. A finger of {:.0} mm presses {:.0} mm deep and is dragged {:.0} mm to and fro at {:.0} mm/s.",
-        1e3 * RADIUS_M,
+        1e3 * place::RADIUS_M,
         1e3 * DEPTH_M,
         1e3 * DRAG_M,
         1e3 * SPEED_M_PER_S
@@ -58,12 +59,15 @@ pub struct Options {
     /// Walls of the heart pass through each other
     #[arg(long)]
     no_self_contact: bool,
+    /// Tell what a finger feels at five places instead, beside many tets alone: some minutes a heart
+    #[arg(long)]
+    answers: bool,
 }
 
 impl Options {
     /// So many hearts, with 200 and with 600 particles awake.
     pub(crate) fn of(hearts: u64) -> Self {
-        Self { hearts, seed: 1, awake: vec![200, 600], no_self_contact: false }
+        Self { hearts, seed: 1, awake: vec![200, 600], no_self_contact: false, answers: false }
     }
 }
 
@@ -72,6 +76,9 @@ impl Options {
 /// # Errors
 /// A heart that cannot be built.
 pub fn print(options: &Options) -> Result<()> {
+    if options.answers {
+        return answers::print(options.seed..options.seed.saturating_add(options.hearts), &options.awake);
+    }
     println!("{}\n", what());
     println!(
         "| heart | awake | substeps | at rest | dragged: median, p99, longest | substeps taken | mean force | swaying | asleep: after, median, p99 |"
@@ -112,12 +119,12 @@ fn rows(name: &str, spec: &ModelSpec, options: &Options, keep: &mut dyn FnMut(He
             spec.settings.self_contact = SelfContactChoice::Off;
         }
         spec.tools = Vec::new();
-        let place = Place::of(&Model::build(spec.clone()).into_diagnostic()?);
+        let place = Place::of(&Model::build(spec.clone()).into_diagnostic()?, 0.0);
         spec.settings.sleep_tolerance_m = SLEEP_TOLERANCE_M;
         spec.tools = vec![ToolSpec {
             name: "finger".to_owned(),
             shape: ToolShape::Sphere,
-            radius_m: RADIUS_M,
+            radius_m: place::RADIUS_M,
             coupling: Coupling::Rigid,
             friction_coefficient: 0.0,
             start_position_m: place.finger_m(-GAP_M, 0.0),
@@ -184,33 +191,6 @@ impl fmt::Display for HeartTicks {
             self.swaying_us,
             self.asleep.map_or_else(|| "never".to_owned(), |asleep| asleep.to_string())
         )
-    }
-}
-
-/// Where a heart is pressed.
-#[derive(Debug, Clone, Copy)]
-struct Place {
-    touch_m: DVec3,
-    outwards: DVec3,
-    drag: DVec3,
-}
-
-impl Place {
-    /// The vertex that is outermost across the heart's axis and somewhat towards its apex, whose tangent plane has nothing before it.
-    fn of(bare: &Model) -> Self {
-        let x = bare.surface_rest_positions_m();
-        let held: Vec<DVec3> =
-            bare.prescribed()[0].nodes.iter().map(|&n| bare.rest_positions_m()[n as usize]).collect();
-        let mean = |points: &[DVec3]| points.iter().sum::<DVec3>() / points.len() as f64;
-        let apexwards = (mean(x) - mean(&held)).normalize();
-        let outwards = (apexwards.any_orthonormal_vector() + 0.5 * apexwards).normalize();
-        let touch_m = x.iter().copied().max_by(|a, b| a.dot(outwards).total_cmp(&b.dot(outwards))).unwrap_or_default();
-        Self { touch_m, outwards, drag: apexwards.cross(outwards).normalize() }
-    }
-
-    /// Position (m) of a finger that is so deep (m), dragged so far (m).
-    fn finger_m(&self, depth_m: f64, dragged_m: f64) -> DVec3 {
-        self.touch_m + self.outwards * (RADIUS_M - depth_m) + self.drag * dragged_m
     }
 }
 
