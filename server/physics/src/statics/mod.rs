@@ -100,17 +100,15 @@ fn held(free: Option<FreePart>) -> Result<(), SolveError> {
     free.map_or(Ok(()), |part| Err(part.into()))
 }
 
-/// The `count` lowest natural modes about rest, ascending, of a body of tetrahedra, or of the coarse level of one with
-/// particles, which all sleep.
+/// The `count` lowest natural modes of a body of tetrahedra about rest, ascending.
 ///
 /// # Errors
 /// [`SolveError`]; other bodies have none that are known.
 pub fn natural_modes(model: &Model, count: usize) -> Result<Vec<Mode>, SolveError> {
-    match model.body() {
-        Body::Tet(body) => Ok(tet::natural_modes(body, model.surface(), count)?),
-        Body::Hybrid(body) => Ok(body.sleeping_modes(count)?),
-        _ => Err(SolveError::NotForThisBody { what: "natural vibration", but: ", and of those with particles" }),
-    }
+    let Some(body) = model.body().as_tet() else {
+        return Err(SolveError::NotForThisBody { what: "natural vibration", but: "" });
+    };
+    Ok(tet::natural_modes(body, model.surface(), count)?)
 }
 
 fn check(model: &Model, goal: &Goal<'_>, settings: &StaticSettings) -> Result<(), SolveError> {

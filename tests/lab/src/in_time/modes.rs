@@ -49,10 +49,10 @@ pub(super) fn print() -> Result<()> {
     }
     for cells in COARSE {
         let model = asleep(&problem, cells)?;
-        let modes = natural_modes(&model, MODES).into_diagnostic()?;
+        let Some(body) = model.body().as_hybrid() else { continue };
+        let modes = body.sleeping_modes(MODES).into_diagnostic()?;
         let name = format!("{} coarse tets", 3 * cells.pow(3));
         row(&name, &modes.iter().map(|mode| mode.frequency_hz).collect::<Vec<_>>(), &limit_hz);
-        let Some(body) = model.body().as_hybrid() else { continue };
         let with_particles_hz = modes
             .iter()
             .map(|mode| mode.frequency_hz / body.particles_kinetic_share(&mode.shape_per_sqrt_kg).sqrt())

@@ -53,7 +53,7 @@ impl HybridBody {
     ///
     /// # Errors
     /// It is not held, or its lowest modes are not found.
-    pub(crate) fn sleeping_modes(&self, count: usize) -> Result<Vec<Mode>, ModesError> {
+    pub fn sleeping_modes(&self, count: usize) -> Result<Vec<Mode>, ModesError> {
         if let Some(part) = self.first_free_part() {
             return Err(ModesError::UnderConstrained(part));
         }
