@@ -45,9 +45,9 @@ enum Command {
     Ripple,
     /// What ticks of irregular hearts cost: at rest, pressed and dragged, and swaying after it
     Hearts(hearts::Options),
-    /// How far bodies are off in time: their natural frequencies, and how stiff they are under a patch that swings, by frequency: a minute
+    /// How far bodies are off in time: their natural frequencies, and how stiff they are under a patch that swings, by frequency: some minutes
     InTime,
-    /// What a tick takes with each thing left out that a scene does not need, and without: a minute
+    /// What a tick takes with each thing left out that a scene does not need, and without: some minutes
     Skips,
     /// Makes the two surfaces of the heart that is shipped (deploy/scenes/heart.toml)
     HeartSurfaces(hearts::ShippedOptions),

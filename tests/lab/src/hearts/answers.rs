@@ -43,13 +43,11 @@ pub(super) fn print(seeds: Range<u64>, awake: &[usize]) -> Result<()> {
     println!("|---|---|---|---|{}", "---|".repeat(awake.len()));
     for seed in seeds {
         let heart = Heart::random(seed)?;
-        let of_tets = TETS.map(|tets| Heart::of_tets(seed, tets, false));
-        let [few, many] = of_tets;
-        let specs = [few?.spec, many?.spec];
+        let [few, many] = [Heart::of_tets(seed, TETS[0], false)?.spec, Heart::of_tets(seed, TETS[1], false)?.spec];
         let bare = Model::build(heart.spec.clone()).into_diagnostic()?;
         for number in 0..PLACES {
             let place = Place::of(&bare, TAU * f64::from(number) / f64::from(PLACES));
-            let [few_n, many_n] = [pressed_n(specs[0].clone(), place)?, pressed_n(specs[1].clone(), place)?];
+            let [few_n, many_n] = [pressed_n(few.clone(), place)?, pressed_n(many.clone(), place)?];
             let beside = |force_n: f64| format!("{force_n:.4} ({:+.1} %)", 100.0 * (force_n / many_n - 1.0));
             let mut cells = vec![beside(few_n), format!("{many_n:.4}")];
             for &awake in awake {
@@ -89,6 +87,9 @@ fn pressed_n(mut spec: ModelSpec, place: Place) -> Result<f64> {
         if tick > goes + rests - averaged {
             sum_n += force_n;
         }
+    }
+    if let Some(quarantine) = slow.state().quarantine {
+        bail!("the heart did not survive: {quarantine:?}");
     }
     Ok(sum_n.length() / f64::from(averaged))
 }

@@ -60,7 +60,7 @@ pub struct Options {
     #[arg(long)]
     no_self_contact: bool,
     /// Tell what a finger feels at five places instead, beside many tets alone: some minutes a heart
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_self_contact")]
     answers: bool,
 }
 

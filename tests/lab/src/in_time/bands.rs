@@ -2,7 +2,8 @@
 //!
 //! The load `F` of the lab's sweep sets all frequencies going, and `u` is where it presses. Of a body that answers linearly
 //! `F̂(s) = K(s) û(s)`, with `û(s) = Σ u e^{−st}` over the ticks of the whole answer. With `s = β + iω` what comes late counts
-//! little, so that an answer of a second is whole, and mass damping is `2β` more than in the sweep (`s² + αs`, less a constant β² + αβ).
+//! little, so that an answer of a second is whole. Of a mass with damping α that is `s² + αs = −ω² + i(2β + α)ω + β² + αβ`: as if it were damped by
+//! `2β` more than in the sweep, and held by a spring of `β² + αβ` times the mass.
 //! F is the same for all, so that the stiffness of a method over the reference's is `|û_reference| / |û|`.
 use crate::{
     methods::{self, LINEAR_TETS, Method, Pace, SMOOTHED_TETS},

@@ -27,7 +27,7 @@ use std::{
 /// What is run.
 #[derive(Debug, Clone, Args)]
 pub struct Options {
-    /// A dozen problems, three resolutions, few repetitions: under two minutes
+    /// A dozen problems, three resolutions, few repetitions: some minutes
     #[arg(long, conflicts_with = "full")]
     quick: bool,
     /// Every problem and resolution (the default is every problem at the quick run's resolutions)

@@ -77,7 +77,7 @@ pub(super) fn unwatched_skin(rounds: usize) -> Result<Found> {
         std::hint::black_box(&skin_m);
     };
     let times = interleaved(&mut [Box::new(|| unwatched.drag()), Box::new(&mut watch)], rounds);
-    Ok(found(&times, &hands))
+    found(&times, &hands)
 }
 
 /// A heart that has come to rest, left alone or computed on.
@@ -104,7 +104,7 @@ pub(super) fn sleep(rounds: usize) -> Result<Found> {
     let [sleepy, awake] = &mut hands;
     let times = interleaved(&mut [Box::new(|| sleepy.stay()), Box::new(|| awake.stay())], rounds);
     ensure!(hands[0].finger.state().sleep.asleep, "the heart woke while it was timed");
-    Ok(found(&times, &hands))
+    found(&times, &hands)
 }
 
 fn spec(change: impl FnOnce(&mut ModelSpec) -> Result<()>) -> Result<ModelSpec> {
@@ -124,16 +124,18 @@ fn compare(
     hands.iter_mut().for_each(Hand::press);
     let [one, other] = &mut hands;
     let times = interleaved(&mut [Box::new(|| one.drag()), Box::new(|| other.drag())], rounds);
-    Ok(found(&times, &hands))
+    found(&times, &hands)
 }
 
-fn found(times: &[Summary], hands: &[Hand<'_>; 2]) -> Found {
+fn found(times: &[Summary], hands: &[Hand<'_>; 2]) -> Result<Found> {
+    let survived = hands.iter().all(|hand| hand.finger.state().quarantine.is_none());
+    ensure!(survived, "a tick of the heart was refused, so that what was timed are no ticks");
     let [mut one_m, mut other_m] = [Vec::new(), Vec::new()];
     hands[0].model.surface_positions_m(hands[0].finger.state(), &mut one_m);
     hands[1].model.surface_positions_m(hands[1].finger.state(), &mut other_m);
     let farthest_m = one_m.iter().zip(&other_m).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     let same_bits = hands[0].finger.state().mechanical == hands[1].finger.state().mechanical;
-    Found { with: times[0], without: times[1], same_bits, farthest_m }
+    Ok(Found { with: times[0], without: times[1], same_bits, farthest_m })
 }
 
 /// A hand with its finger beside a heart.
