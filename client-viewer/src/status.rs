@@ -40,8 +40,12 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
     line(
         "body",
         format!(
-            "{} nodes, {} tets, {} surface triangles, {:.4} kg",
-            session.node_count, session.tet_count, session.surface_triangle_count, session.mass_kg
+            "{}{} nodes, {} tets, {} surface triangles, {:.4} kg",
+            if session.particle_count > 0 { "coarse level of " } else { "" },
+            session.node_count,
+            session.tet_count,
+            session.surface_triangle_count,
+            session.mass_kg
         ),
     );
     if session.particle_count > 0 {

@@ -201,10 +201,13 @@ impl Cli {
                 handle.guarded_by(program);
             }
             obey_signals(shutdown.clone(), handle.clone())?;
-            let summary = run_with(&config, shutdown, handle).await?;
-            // A reader that has gone misses the counters, no more.
-            let _ = writeln!(std::io::stdout(), "{summary}");
-            Ok(ExitCode::SUCCESS)
+            let ended = run_with(&config, shutdown, handle.clone()).await;
+            // The counters are wanted most where a run ended badly. A reader that has gone misses them, no more.
+            let summary = handle.stats().summary();
+            if ended.is_ok() || summary.ticks > 0 {
+                let _ = writeln!(std::io::stdout(), "{summary}");
+            }
+            ended.map(|_| ExitCode::SUCCESS)
         })
     }
 

@@ -98,7 +98,10 @@ pub enum BridgeError {
     },
     /// The arm failed in the loop.
     #[error("the arm is lost: {fault}; its force was taken away")]
-    #[diagnostic(help("see to the arm, and start the bridge again: the force comes back slowly"))]
+    #[diagnostic(help(
+        "see to the arm, and start the bridge again: the force comes back slowly. If other work held this machine up, the arm may be well: \
+         end that work, or raise silence_s in [device]"
+    ))]
     DeviceLost {
         /// Why.
         fault: crate::device::Fault,

@@ -180,7 +180,11 @@ fn draw_tools(canvas: &mut Canvas, camera: &Camera, surface: &Surface) {
         if force.length() > 1e-6 {
             // A newton is as long as 30 % of the body; longer arrows are cut at half of it.
             let length = (0.3 * force.length()).min(0.5) * camera.body_size_m;
-            for t in solids::arrow(centre, force.normalize(), length, camera.body_size_m * 0.008, ARROW) {
+            // From the tool's surface, since a tool is often larger than the arrow is long.
+            let direction = force.normalize();
+            let inside_m = (along * shape.half_length_m as f32).dot(direction).abs() + shape.radius_m as f32;
+            let tail = centre + direction * inside_m;
+            for t in solids::arrow(tail, direction, length, camera.body_size_m * 0.008, ARROW) {
                 canvas.triangle(camera, t);
             }
         }

@@ -156,7 +156,8 @@ impl Servo {
         count_if(&stats.saturated, tick.limited.saturated);
         count_if(&stats.rate_limited, tick.limited.rate_limited);
         count_if(&stats.non_finite, tick.limited.non_finite || !motion_finite);
-        count_if(&stats.damped, tick.added_damping_n_s_per_m > 0.0 || tick.is_capped);
+        let is_held_back = tick.added_damping_n_s_per_m > 0.0 || tick.is_capped;
+        count_if(&stats.damped, tick.verdict.ramp > 0.0 && is_held_back);
         stats.latched.set(self.law.latched());
         stats.dropped_up.set(self.up.overwritten());
         stats.dropped_down.set(self.down.overwritten());

@@ -55,7 +55,7 @@ pub fn from_wire(source: WireSource, folders: &[PathBuf]) -> Result<Scene, Statu
 /// The real path, if it lies below one of the folders: links and `..` lead nowhere else.
 fn allowed(path: &Path, folders: &[PathBuf]) -> Result<PathBuf, Status> {
     if folders.is_empty() {
-        let text = "this daemon serves no scene files; start it with --scene-folder, or send the scene as `toml`";
+        let text = "this daemon serves no scene files: start palpated with --scene-folder FOLDER, or send the text of a scene that names no files";
         return Err(Status::permission_denied(text));
     }
     // One message for what is missing and what is elsewhere: nobody explores the disk through it.

@@ -116,6 +116,8 @@ fn what_cannot_be_chosen_is_told_and_nothing_is_written() {
     refused(&SCENE.replace("[scene]", "[scene"), &[], "is not TOML");
     let missing = fit(Path::new("no/such/scene.toml"), &[]);
     assert!(missing.code == Some(1) && missing.said.contains("cannot read no/such/scene.toml"), "{}", missing.said);
+    // Half the radius of a needle would be a lattice of millions of particles.
+    refused(&SCENE.replace("radius_mm = 8", "radius_mm = 0.2"), &[], "particles; at most 5e5 are allowed here");
     let built_in = fit(Path::new("heart"), &[]);
     assert!(built_in.said.contains("\"heart\" is built in: there is no file to write into"), "{}", built_in.said);
     let zero = fit(Path::new("heart"), &["--tick-us", "0"]);

@@ -215,7 +215,7 @@ fn bodies_that_are_none_or_two_or_out_of_range() {
     let mesh = "[body.mesh]\nfile = \"heart.msh\"\nunit = \"mm\"\n";
     assert_eq!(
         refused("[body.box]\nsize_mm = [10, 10, 10]\ncells = [2, 2, 2]\n", mesh),
-        "t.toml:4:8: body.mesh.file refers to the file heart.msh, but this scene came without a folder (send scenes that need no file, or have the daemon load the file from its own disk (`palpate-view load --on-daemon`))"
+        "t.toml:4:8: body.mesh.file refers to the file heart.msh, but this scene came without a folder (send scenes that need no file, or have the daemon load the file from its own disk (`palpate-view load --on-daemon`, below a folder that `palpated --scene-folder` names))"
     );
 }
 

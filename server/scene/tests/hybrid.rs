@@ -180,23 +180,69 @@ fn the_ventricles_lattice_lies_in_its_cut() {
     Model::build(scene.model).unwrap();
 }
 
+/// A ventricle's wall between two surface files.
+fn between_surfaces(unit: &str, target_tets: u32, particles: &str) -> Result<Scene, String> {
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes/data");
+    let text = format!(
+        "[scene]\nname = \"t\"\n[body.surfaces]\ninner_file = \"ventricle-inner.stl\"\nouter_file = \"ventricle-outer.ply\"\nunit = \"{unit}\"\n\
+         target_tets = {target_tets}\n[body.particles]\n{particles}\n[[fixed]]\nregion = \"base\"\n[[load]]\nregion = \"inner\"\n\
+         pressure_pa = 10\nfollower = true\namplitude.constant = 1\n{TAIL}"
+    );
+    parse(&text, "t.toml", Some(&data), &Limits::local(), &mut |_, _| {}).map_err(|error| error.one_line())
+}
+
+fn longest_m([a, b, c]: [DVec3; 3]) -> f64 {
+    a.distance(b).max(b.distance(c)).max(c.distance(a))
+}
+
+/// The skin between two surfaces is as fine as the scene says, as it is around any other body.
+#[test]
+fn edges_of_the_skin_between_two_surfaces_are_as_short_as_told() {
+    let scene = between_surfaces("mm", 500, "spacing_mm = 4\nskin_edge_mm = 2.5").unwrap();
+    let skin = &scene.model.body.as_hybrid().unwrap().particles.skin;
+    let longest = (0..skin.triangles().len()).map(|triangle| longest_m(skin.corners_m(triangle))).fold(0.0, f64::max);
+    assert!(longest > 2e-3 && longest <= 2.5e-3 * 1.000_001, "{longest}");
+}
+
+/// A body in another unit than its lattice is told of as such, whether the lattice is far too fine or far too coarse for it.
+#[test]
+fn a_wrong_unit_is_told_where_the_lattice_does_not_fit() {
+    for unit in ["m", "um"] {
+        let message = between_surfaces(unit, 500, "spacing_mm = 4").unwrap_err();
+        let told = format!("[body.surfaces] says unit = \"{unit}\"; should it be unit = \"mm\"?");
+        assert!(message.contains("spacing_m") && message.contains(&told), "{message}");
+    }
+    let message = between_surfaces("mm", 20, "spacing_mm = 4").unwrap_err();
+    assert!(message.starts_with("t.toml:7:15: 20 tets cannot fill this wall well"), "{message}");
+    assert!(message.contains("or more; a thin wall needs many"), "{message}");
+}
+
+/// The stable neo-Hookean law stores ½λ where a body is crushed to a point, which is less than at rest with a negative λ.
+#[test]
+fn a_law_that_would_collapse_is_refused_at_its_constant() {
+    let text = |law: &str, constants: &str| {
+        let text = small("spacing_mm = 1.25", "").replace("stable-neo-hookean", law);
+        text.replace("young_modulus_pa = 1e4\npoisson_ratio = 0.3", constants)
+    };
+    let by_ratio = "young_modulus_pa = 10e3\npoisson_ratio = -0.1";
+    let by_lame = "lambda_pa = -1e3\nmu_pa = 4e3";
+    for (constants, key) in [(by_ratio, "poisson_ratio = -0.1"), (by_lame, "lambda_pa = -1000")] {
+        let refused = loaded(&text("stable-neo-hookean", constants)).unwrap_err();
+        assert!(refused.contains(&format!("material[0].{key}")) && refused.contains("would collapse"), "{refused}");
+        loaded(&text("fixed-corotated", constants)).unwrap();
+    }
+    loaded(&text("stable-neo-hookean", "young_modulus_pa = 10e3\npoisson_ratio = 0")).unwrap();
+}
+
 /// Two surface files: the skin is both of them, the inner one turned, and the strip between their rims.
 #[test]
 fn two_surfaces_become_a_skin_and_coarse_tets() {
-    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes/data");
-    let text = format!(
-        "[scene]\nname = \"t\"\n[body.surfaces]\ninner_file = \"ventricle-inner.stl\"\nouter_file = \"ventricle-outer.ply\"\nunit = \"mm\"\n\
-         target_tets = 500\n[body.particles]\nspacing_mm = 4\n[[fixed]]\nregion = \"base\"\n[[load]]\nregion = \"inner\"\n\
-         pressure_pa = 10\nfollower = true\namplitude.constant = 1\n{TAIL}"
-    );
-    let scene = parse(&text, "t.toml", Some(&data), &Limits::local(), &mut |_, _| {})
-        .unwrap_or_else(|error| panic!("{}", error.one_line()));
+    let scene = between_surfaces("mm", 500, "spacing_mm = 4").unwrap();
     let skin = &scene.model.body.as_hybrid().unwrap().particles.skin;
     let volume = scene.model.body.solid().unwrap().mesh.total_volume_m3();
     assert!((skin.volume_m3() / volume - 1.0).abs() < 0.02, "{} {volume}", skin.volume_m3());
     for triangle in 0..skin.triangles().len() {
-        let [a, b, c] = skin.corners_m(triangle);
-        assert!(a.distance(b).max(b.distance(c)).max(c.distance(a)) <= 4e-3 * 1.000_001);
+        assert!(longest_m(skin.corners_m(triangle)) <= 4e-3 * 1.000_001);
     }
     let parts = |name: &str| scene.summary.parts.iter().find(|part| part.name == name).unwrap();
     let total: usize = ["inner", "outer", "base"].iter().map(|name| parts(name).triangles).sum();
@@ -255,7 +301,16 @@ fn particles_that_cannot_be_are_told_at_their_key() {
             "fine_depth_mm = -1",
             "t.toml:8:17: body.particles.fine_depth_m = -0.001: must not be negative",
         ),
-        ("spacing_mm = 1", "reach_mm = 0", "t.toml:8:12: body.particles.reach_m = 0: must be larger than 0"),
+        (
+            "spacing_mm = 1",
+            "reach_mm = 0",
+            "t.toml:8:12: body.particles.reach_m = 0: must be no smaller than the spacing, or no particle would wake",
+        ),
+        (
+            "spacing_mm = 1",
+            "reach_mm = 0.9",
+            "t.toml:8:12: body.particles.reach_m = 0.0009: must be no smaller than the spacing, or no particle would wake",
+        ),
         (
             "spacing_mm = 1",
             "most_poisson_ratio = 0.6",

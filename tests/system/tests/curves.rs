@@ -10,12 +10,28 @@ use lab::{
 };
 use palpate_bridge::config::RecordConfig;
 use palpate_system_tests::daemon::Daemon;
-use std::{fs, path::Path, time::Duration};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 /// Into the ventricle's wall, a rest, and out again.
 fn hand(period_s: f64) -> Hand {
     let keys = [(0.0, 0.045), (0.1, 0.045), (0.5, 0.026), (0.6, 0.026), (0.9, 0.045)];
     Hand { keys: keys.map(|(share, x_m)| (share * period_s, x_m)).to_vec(), period_s }
+}
+
+/// The scene `ventricle` with a fifth of its tets: nine arms are compared on one body, and a machine that builds and tests has time
+/// left beside its ticks.
+fn light_heart(folder: &Path) -> PathBuf {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes/ventricle.toml");
+    let text = fs::read_to_string(scene).unwrap();
+    let light = text.replace("target_tets = 1352", "target_tets = 270");
+    assert_ne!(light, text, "the scene says how many tets it has");
+    let path = folder.join("light-heart.toml");
+    fs::write(&path, light).unwrap();
+    path
 }
 
 /// A period of the press, a value a millisecond.
@@ -88,8 +104,9 @@ impl Curve {
     }
 }
 
-/// The curve of an arm on the ventricle.
-fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> Curve {
+/// The curve of an arm on the ventricle; none if its force was taken away meanwhile, since the machine stood still for longer than a
+/// bridge waits for answers.
+fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> Option<Curve> {
     let mut config = lab::config(&daemon.url, arm.device.clone());
     config.workspace = arms::workspace();
     config.record = RecordConfig { path: Some(recording.to_owned()), overwrite: true };
@@ -99,7 +116,7 @@ fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> 
     let summary = bridge.stop().unwrap();
     println!("{summary}");
     daemon.wait_until("the tool is free", |status| status["devices"].as_array().is_some_and(Vec::is_empty));
-    Curve::of(recording, period_s)
+    (summary.latched == 0).then(|| Curve::of(recording, period_s))
 }
 
 /// A machine that runs tests stands still for 17 ms now and then, and then the force is gone for 0.7 s: so often is a press tried.
@@ -109,12 +126,13 @@ const PRESSES: usize = 22;
 
 /// Presses until the force of a press, or the median of all so far, is that of `expected`, but for `most` of the peak (root mean
 /// square).
-fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Curve) {
+fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Option<Curve>) {
     let expected_n = expected.peak_n();
     assert!(expected_n > 0.5, "it presses");
     let (mut least_n, mut pressed) = (f64::INFINITY, Vec::new());
     for _ in 0..TRIES {
-        pressed.push(press().laid_over(expected));
+        let Some(curve) = press() else { continue };
+        pressed.push(curve.laid_over(expected));
         let last = &pressed[pressed.len() - 1];
         // Of an even number of presses there is no middle one.
         let median = (pressed.len() % 2 == 1).then(|| Curve::median(&pressed));
@@ -139,7 +157,7 @@ fn judge(name: &str, expected: &Curve, most: f64, press: impl Fn() -> Curve) {
 fn expected(daemon: &Daemon, hand: &Hand, recording: &Path) -> Curve {
     let mut earlier: Vec<Curve> = Vec::new();
     for _ in 0..PRESSES {
-        let curve = pressed(daemon, &arms::simulated(hand), hand.period_s, recording);
+        let Some(curve) = pressed(daemon, &arms::simulated(hand), hand.period_s, recording) else { continue };
         let same = |a: &Curve, b: &Curve| a.laid_over(b).apart_n(b).0 < 5e-3 * a.peak_n();
         if earlier.iter().any(|before| same(&curve, before)) {
             return curve;
@@ -157,13 +175,16 @@ fn expected(daemon: &Daemon, hand: &Hand, recording: &Path) -> Curve {
             }
         }
     }
-    panic!("the simulated arm's force is not the same twice in {} presses", earlier.len());
+    panic!(
+        "of {PRESSES} presses of the simulated arm {} kept their force, and it was not the same twice",
+        earlier.len()
+    );
 }
 
 #[test]
 fn every_arm_gives_the_force_curve_of_the_simulated_arm_on_the_heart() {
-    let daemon = Daemon::start(&["--arm", "none", "ventricle"]);
     let folder = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(&["--arm", "none", light_heart(folder.path()).to_str().unwrap()]);
     let file = |name: &str| folder.path().join(name);
     let libhd = file("libHD.so");
     fs::copy(libhd::built(), &libhd).unwrap();

@@ -87,15 +87,21 @@ impl<'m> Expected<'m> {
     fn sentence(&self) -> String {
         let [light_mm, deep_mm] = [0, 1].map(|number| short(self.depth_m(number) * 1e3));
         let [light, deep] = [0, 1].map(|number| two_digits(100.0 * self.ripple(number)));
+        let is_one_depth = light_mm == deep_mm;
         let serving = |smooth_skin| {
             let [fine_mm, coarse_mm] = [0, 1].map(|number| two_digits(self.serving_m(number, smooth_skin) * 1e3));
-            format!("particles {coarse_mm} mm apart at the one depth, {fine_mm} mm apart at the other")
+            if is_one_depth {
+                format!("particles {coarse_mm} mm apart")
+            } else {
+                format!("particles {coarse_mm} mm apart at the one depth, {fine_mm} mm apart at the other")
+            }
         };
+        let lightly = if is_one_depth { String::new() } else { format!(", and by about {light} % {light_mm} mm deep") };
         let with_means =
             if self.smooth_skin { String::new() } else { format!("; with smooth_skin = true, on {}", serving(true)) };
         format!(
             "dragged over particles {} mm apart, the tool \"{}\", {} mm in radius, feels them: its force swings by about {deep} % of its mean {deep_mm} mm \
-             deep, and by about {light} % {light_mm} mm deep. It is smooth to {} % on {}{with_means} (in [body.particles])",
+             deep{lightly}. It is smooth to {} % on {}{with_means} (in [body.particles])",
             short(self.spacing_m * 1e3),
             self.tool.name,
             short(self.tool.radius_m * 1e3),

@@ -143,23 +143,28 @@ fn print_time(model: &Model, cost: &Cost) {
     ));
 }
 
-fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> &'static str {
+fn verdict(us: &Percentiles, period_us: f64, cost: &Cost) -> String {
     let awake = cost.awake.is_some();
     if us.p50 > USABLE * period_us {
-        if awake {
-            "does NOT fit: lower most_active, or raise spacing_m or tick_period_s"
+        let lighter = if awake {
+            "lower most_active, or raise spacing_m or tick_period_s"
         } else {
-            "does NOT fit: coarsen the mesh or lengthen tick_period_s"
-        }
-    } else if us.p99 > period_us {
-        if awake {
-            "fits, but for more than one tick in a hundred: particles switched in them, or other work held this machine up"
-        } else {
-            "fits, but other work on this machine held up more than one tick in a hundred"
-        }
-    } else {
-        "fits"
+            "coarsen the mesh or lengthen tick_period_s"
+        };
+        return format!(
+            "does NOT fit into the {:.0} % that it may take: {lighter}; or other work held this machine up",
+            100.0 * USABLE
+        );
     }
+    let late = us.p99 > period_us;
+    let fits = match (late, awake) {
+        (true, true) => {
+            "fits, but for more than one tick in a hundred: particles switched in them, or other work held this machine up"
+        }
+        (true, false) => "fits, but other work on this machine held up more than one tick in a hundred",
+        (false, _) => "fits",
+    };
+    fits.to_owned()
 }
 
 /// Whether walls of the body press each other where they meet.

@@ -14,7 +14,9 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
     let _ = writeln!(text, "scene      {}{dash}{description}", info.scene_name);
     let _ = writeln!(
         text,
-        "body       {} nodes, {} tets, {} surface triangles, {:.1} g; highest natural frequency {:.0} Hz",
+        "body       {}{} nodes, {} tets, {} surface triangles, {:.1} g; highest natural frequency {:.0} Hz",
+        // Nodes in the middle of tets' edges are counted, too.
+        if info.particle_count > 0 { "coarse level of " } else { "" },
         info.node_count,
         info.tet_count,
         info.surface_triangle_count,

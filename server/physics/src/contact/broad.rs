@@ -11,7 +11,7 @@
 //! can be touched: far from the body a tick costs two additions per tool and substep. A box is at least as far from an
 //! axis as from the axis's centre, less half its length; the same holds for pieces of the axis
 //! ([`Axis::distance_bound_m`]).
-use super::{CarriersThen, axis::Axis};
+use super::{CarriersThen, ClustersThen, axis::Axis};
 use crate::mesh::Surface;
 use glam::DVec3;
 use std::ops::Range;
@@ -113,6 +113,14 @@ pub(crate) trait Skin {
 
     /// Returns a bound of how far (m) any vertex is from where it was then. Nothing is known of a skin that notes nothing.
     fn moved_m(&self, _: &CarriersThen) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Notes where what carries a cluster of walls is.
+    fn remember_walls(&self, _cluster: usize, _: &mut ClustersThen) {}
+
+    /// Returns a bound of how far (m) any vertex of a cluster of walls is from where it was then.
+    fn walls_moved_m(&self, _cluster: usize, _: &ClustersThen) -> f64 {
         f64::INFINITY
     }
 }

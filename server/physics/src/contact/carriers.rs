@@ -8,6 +8,26 @@ pub(crate) struct MostCarriers {
     pub(crate) nodes: usize,
     /// Most particles that are active at once.
     pub(crate) active: usize,
+    /// Nodes that clusters of walls follow, each counted with each of its clusters.
+    pub(crate) of_clusters: usize,
+}
+
+/// Where what carries clusters of walls was, for each of them when it was listed. Its clones keep the capacity.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ClustersThen {
+    /// Displacements (m) of the nodes that clusters follow, one cluster after the other.
+    pub(crate) nodes_m: Box<[DVec3]>,
+    /// Whether something else carried a cluster, too.
+    pub(crate) is_unknown: Box<[bool]>,
+}
+
+impl ClustersThen {
+    pub(crate) fn with_room(most: MostCarriers, clusters: usize) -> Self {
+        Self {
+            nodes_m: vec![DVec3::ZERO; most.of_clusters].into_boxed_slice(),
+            is_unknown: vec![true; clusters].into_boxed_slice(),
+        }
+    }
 }
 
 /// Displacements (m) of a skin's carriers at some instant. Its clones keep the capacity.

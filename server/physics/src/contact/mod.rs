@@ -37,7 +37,7 @@ mod turning;
 
 pub(crate) use axis_samples::Near;
 pub(crate) use broad::Skin;
-pub(crate) use carriers::{CarriersThen, MostCarriers};
+pub(crate) use carriers::{CarriersThen, ClustersThen, MostCarriers};
 pub use following::{CoupledFollowing, Following};
 pub use inside::is_inside;
 pub use local_torque::LocalTorqueModel;
@@ -249,6 +249,15 @@ impl ContactModel {
     #[must_use]
     pub(crate) fn with_walls(self, walls: Option<SelfContact>) -> Self {
         Self { walls: walls.map(Box::new), ..self }
+    }
+
+    /// Returns the same contact, where clusters of walls follow so many nodes, each counted with each of its clusters.
+    #[must_use]
+    pub(crate) fn with_walls_following(mut self, of_clusters: usize) -> Self {
+        if let Some(walls) = &mut self.walls {
+            walls.follow(of_clusters);
+        }
+        self
     }
 
     /// Returns how walls of the body press each other, `None` where they do not.

@@ -100,6 +100,12 @@ impl Material {
         self.law.energy_density(self.lame, f) + crushing_limit::energy_density(self.crushing_pa, f)
     }
 
+    /// Returns whether the law stores less where the body is pressed to a point (`F = 0`) than at rest: such a body collapses. The
+    /// stable neo-Hookean law does with a negative λ, as `Ψ(0) = ½λ`.
+    pub fn prefers_collapse(&self) -> bool {
+        self.law.energy_density(self.lame, &DMat3::ZERO) < 0.0
+    }
+
     /// First Piola-Kirchhoff stress `P = ∂Ψ/∂F` (Pa).
     pub fn piola(&self, f: &DMat3) -> DMat3 {
         self.law.piola(self.lame, f) + crushing_limit::piola(self.crushing_pa, f)

@@ -198,18 +198,7 @@ impl BodyMesh {
 /// Makes the body.
 pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMut(f64, &str)) -> Result<Body, Fault> {
     let at = Where::root("body");
-    let key = exactly_one(
-        &at,
-        &[
-            ("box", table.block.is_some()),
-            ("sphere_shell", table.sphere_shell.is_some()),
-            ("ellipsoid_shell", table.ellipsoid_shell.is_some()),
-            ("ventricle", table.ventricle.is_some()),
-            ("mesh", table.mesh.is_some()),
-            ("surfaces", table.surfaces.is_some()),
-            ("surface", table.surface.is_some()),
-        ],
-    )?;
+    let key = exactly_one(&at, &kinds_given(table))?;
     let at = at.key(key);
     progress(0.05, "making the body");
     let kind = kinds::of(table);
@@ -226,7 +215,7 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
         body.skin.iter_mut().flat_map(|skin| &mut skin.positions_m).for_each(|p| *p += offset);
         body.lattice_m.iter_mut().for_each(|p| *p += offset);
     }
-    let warning = implausible_size(table, key, &body);
+    let warning = implausible_size(table, &body);
     body.warnings.extend(warning);
     Ok(body)
 }
@@ -234,8 +223,22 @@ pub(crate) fn make(table: &BodyTable, files: &Files<'_>, progress: &mut dyn FnMu
 /// A body whose size (m) lies outside these was probably given in another unit.
 const PLAUSIBLE_SIZE_M: std::ops::RangeInclusive<f64> = 1e-3..=2.0;
 
+/// The keys that say what a body is made of, and whether a scene gives them.
+fn kinds_given(table: &BodyTable) -> [(&'static str, bool); 7] {
+    [
+        ("box", table.block.is_some()),
+        ("sphere_shell", table.sphere_shell.is_some()),
+        ("ellipsoid_shell", table.ellipsoid_shell.is_some()),
+        ("ventricle", table.ventricle.is_some()),
+        ("mesh", table.mesh.is_some()),
+        ("surfaces", table.surfaces.is_some()),
+        ("surface", table.surface.is_some()),
+    ]
+}
+
 /// Says so when a body is as large or small as one in the wrong unit, with the key to change.
-fn implausible_size(table: &BodyTable, kind: &str, body: &Body) -> Option<String> {
+pub(super) fn implausible_size(table: &BodyTable, body: &Body) -> Option<String> {
+    let kind = kinds_given(table).into_iter().find(|(_, given)| *given)?.0;
     let (low, high) = body.mesh.bounds_m();
     let size_m = (high - low).max_element();
     if PLAUSIBLE_SIZE_M.contains(&size_m) {
@@ -337,7 +340,7 @@ fn from_surfaces(
     let mut part_of_load = |part: f64, what: &str| progress(0.1 + 0.65 * part, what);
     let inner_input = input(&inner, table.inner_unit.unwrap_or(table.unit).in_m());
     let outer_input = input(&outer, table.unit.in_m());
-    let refused = |error: FillError| Fault::value(at.clone(), error.to_string()).of(Stage::Body).cause(error);
+    let refused = |error: FillError| fill_fault(at, error);
     let filled = fill::fill(inner_input, outer_input, options, &mut part_of_load).map_err(refused)?;
     let surface = Surface::of(&filled.mesh).map_err(|error| mesh_fault(at, error))?;
     let warnings = inner.warnings.iter().chain(&outer.warnings).cloned().collect();
@@ -349,6 +352,28 @@ fn from_surfaces(
     let around = |spacing_m| fill::around(inner_input, outer_input, spacing_m).map_err(refused);
     body.skin = kinds::skin_around(&body, of_body, files, around)?;
     Ok(body)
+}
+
+/// At the count of tets where another may do.
+fn fill_fault(at: &Where, error: FillError) -> Fault {
+    let help = match &error {
+        FillError::Count { wanted, highest, .. } if wanted > highest => Some(format!("give {highest} or fewer")),
+        FillError::Count { lowest, .. } => {
+            Some(format!("give {lowest} or more; a thin wall needs many, as they are about as long as it is thick"))
+        }
+        FillError::CountMissed { found, .. } => Some(format!("give {found}")),
+        FillError::Quality { .. } => Some(
+            "give another count, half or twice as many, or surfaces that are smoother or farther apart there"
+                .to_owned(),
+        ),
+        _ => None,
+    };
+    let at = if help.is_some() { at.key("target_tets") } else { at.clone() };
+    let fault = Fault::value(at, error.to_string()).of(Stage::Body).cause(error);
+    match help {
+        Some(help) => fault.help(help),
+        None => fault,
+    }
 }
 
 fn input(file: &SurfaceFile, metres_per_unit: f64) -> SurfaceInput<'_> {

@@ -69,6 +69,18 @@ pub(super) fn constants(table: &MaterialTable, at: &Where) -> Result<Constants, 
 fn material(table: &MaterialTable, region: &str, at: &Where) -> Result<Region, Fault> {
     let Constants { lame, viscosity, convention, density_kg_per_m3 } = constants(table, at)?;
     let material = Material::new(table.law.0, lame, viscosity, convention);
+    if material.prefers_collapse() {
+        let (key, value) = match (table.poisson_ratio, table.lambda_pa) {
+            (Some(ratio), _) => ("poisson_ratio", ratio),
+            (None, lambda_pa) => ("lambda_pa", lambda_pa.unwrap_or_default()),
+        };
+        let message = format!(
+            "{} = {value}: with less than 0 a body of the law \"{}\" stores less energy crushed to a point than at rest, and would collapse",
+            at.key(key),
+            table.law.0.name()
+        );
+        return Err(Fault::value(at.key(key), message).help("give 0 or more, or another law"));
+    }
     Ok(Region { name: table.name.clone().unwrap_or_else(|| region.to_owned()), material, density_kg_per_m3 })
 }
 

@@ -33,7 +33,7 @@ impl Files<'_> {
             FilesFrom::Nowhere => {
                 let message = format!("{at} refers to the file {file}, but this scene came without a folder");
                 return Err(Fault::value(at.clone(), message)
-                    .help("send scenes that need no file, or have the daemon load the file from its own disk (`palpate-view load --on-daemon`)"));
+                    .help("send scenes that need no file, or have the daemon load the file from its own disk (`palpate-view load --on-daemon`, below a folder that `palpated --scene-folder` names)"));
             }
             FilesFrom::Program(_) => {
                 let message = format!("{at} refers to the file {file}, which is not a part of the program");

@@ -142,7 +142,7 @@ pub enum FillError {
         highest: u32,
     },
     /// The count came out too far from the wanted one.
-    #[error("the wall was filled with {found} tets instead of {wanted}; try a count nearer to {found}")]
+    #[error("the wall was filled with {found} tets instead of {wanted}")]
     CountMissed {
         /// Asked for.
         wanted: u32,
@@ -151,7 +151,7 @@ pub enum FillError {
     },
     /// The tets are bad.
     #[error(
-        "no good mesh was found: near {} a tet has a dihedral angle of {angle_deg:.2}° (at least {wanted_deg:.2}° is asked for); try another count, smoother surfaces or a lower min_dihedral_deg",
+        "no good mesh was found: near {} a tet has a dihedral angle of {angle_deg:.2}° (at least {wanted_deg:.2}° is needed)",
         mm(at_m)
     )]
     Quality {

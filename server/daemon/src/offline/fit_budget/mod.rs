@@ -12,7 +12,10 @@ use super::{args::positive, interrupt::Interrupt, say::say, summary::Percentiles
 use crate::progress::Progress;
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::bodies::hybrid::spec::MOST_ACTIVE;
-use palpate_scene::wording::{short, two_digits};
+use palpate_scene::{
+    Limits, SceneError, Stage,
+    wording::{short, two_digits},
+};
 use scene_text::{Numbers, SceneText, TextError};
 use std::{
     path::{Path, PathBuf},
@@ -26,6 +29,8 @@ const PART_OF_TICK: f64 = 0.5;
 const SPACING: f64 = 0.5;
 /// Part of the body's volume in whole cells below which the spacing is too coarse for the body; what it is lowered by, and how often.
 const FEW_WHOLE: f64 = 0.35;
+/// Most particles of a lattice whose spacing the scene does not say.
+const MOST_PARTICLES: u32 = 500_000;
 const FINER: f64 = 0.8;
 const MOST_FINER: usize = 4;
 
@@ -123,12 +128,12 @@ struct Found {
 impl Search<'_> {
     fn run(mut self) -> miette::Result<Found> {
         let said = self.text.said;
-        let tets: Vec<Option<u32>> = match (said.target_tets, self.text.asks_for_tets()) {
+        let mut tets: Vec<Option<u32>> = match (said.target_tets, self.text.asks_for_tets()) {
             (None, true) => search::TETS.into_iter().map(Some).collect(),
             (tets, _) => vec![tets],
         };
         let awake = said.most_active.map_or_else(|| search::AWAKE.to_vec(), |most| vec![most]);
-        let (spacing_m, first) = self.spacing(tets[0], awake[0])?;
+        let (spacing_m, first) = self.first(&mut tets, awake[0])?;
         let period_us = first.model.settings().tick_period_s * 1e6;
         let budget_us = self.budget_us.unwrap_or(PART_OF_TICK * period_us);
         let mut fitting = Vec::new();
@@ -147,7 +152,7 @@ impl Search<'_> {
         }
         let Some(most_tets) = fitting.last().map(|last| last.numbers.target_tets) else {
             return Err(miette::miette!(
-                help = "give a larger budget, a longer tick_period_s, or a faster machine",
+                help = "do it again with nothing else running here, or give a larger budget, a longer tick_period_s, or a faster machine",
                 "no numbers were found whose ticks take {} us: the least was {} us, in the median",
                 short(budget_us),
                 short(least_us)
@@ -165,6 +170,19 @@ impl Search<'_> {
         let tool = &first.scene.model.tools[0];
         let (tool, radius_m) = (tool.name.clone(), tool.radius_m);
         Ok(Found { tool, radius_m, period_us, budget_us, particles, reference_awake, fitting })
+    }
+
+    /// Returns the spacing (m) and the body with particles so far apart, of the fewest coarse tets that it can be filled with: fewer, as a thin
+    /// wall cannot be made of, are taken out.
+    fn first(&mut self, tets: &mut Vec<Option<u32>>, most_active: u32) -> miette::Result<(f64, Trial)> {
+        loop {
+            let found = self.spacing(tets[0], most_active);
+            let is_of_body = |error: &miette::Report| error.downcast_ref().map(SceneError::stage) == Some(Stage::Body);
+            if tets.len() == 1 || !found.as_ref().is_err_and(is_of_body) {
+                return found;
+            }
+            tets.remove(0);
+        }
     }
 
     /// Returns the spacing (m), and the body with particles so far apart.
@@ -197,7 +215,13 @@ impl Search<'_> {
         let tets = numbers.target_tets.map_or(String::new(), |tets| format!("{tets} coarse tets, "));
         let spacing = short(numbers.spacing_m * 1e3);
         self.bar.show_work(&format!("{tets}particles {spacing} mm apart, up to {} awake", numbers.most_active));
-        Trial::new(self.path, text)
+        // A lattice that the program chose is not to take minutes and gigabytes.
+        let limits = if self.text.said.spacing_m.is_some() {
+            Limits::local()
+        } else {
+            Limits { tets: MOST_PARTICLES, ..Limits::local() }
+        };
+        Trial::new(self.path, text, &limits)
     }
 
     /// Presses the body with these numbers; with it the number of its coarse tets is returned.
@@ -241,12 +265,13 @@ impl Found {
             "           its forces beside those with {} awake, on the same way:",
             if self.reference_awake == self.particles { "all".to_owned() } else { self.reference_awake.to_string() }
         ));
-        say(format_args!("coarse tets    awake    tick p50 (us)    p99 (us)    stronger    off in all"));
+        say(format_args!("coarse tets  most_active    awake    tick p50 (us)    p99 (us)    stronger    off in all"));
         for (fitting, off) in &self.fitting {
             let Percentiles { p50, p99, .. } = fitting.pressed.tick_wall_us;
             say(format_args!(
-                "{:11} {:8} {p50:16.0} {p99:11.0} {:>+9.1} % {:11.1} %",
+                "{:11} {:12} {:8} {p50:16.0} {p99:11.0} {:>+9.1} % {:11.1} %",
                 fitting.coarse_tets,
+                fitting.numbers.most_active,
                 fitting.pressed.most_awake,
                 100.0 * off.larger,
                 100.0 * off.in_all
@@ -261,7 +286,7 @@ impl Found {
         ));
         if self.late() {
             say(format_args!(
-                "warning: more than one tick in a hundred took longer than the {} ms that it has; {} may need a smaller --tick-us",
+                "warning: more than one tick in a hundred took longer than the {} ms that it has; {} may need a smaller --tick-us, or other work held this machine up",
                 short(self.period_us * 1e-3),
                 path.display()
             ));

@@ -4,7 +4,7 @@
 //! number of tets the most awake that fit are found, and of these the ones whose answer is nearest are taken.
 
 /// Numbers of coarse tets that are tried.
-pub(super) const TETS: [u32; 4] = [200, 400, 800, 1600];
+pub(super) const TETS: [u32; 6] = [200, 400, 800, 1600, 3200, 6400];
 /// Numbers of awake particles that are tried.
 pub(super) const AWAKE: [u32; 9] = [100, 140, 200, 280, 400, 560, 800, 1100, 1600];
 

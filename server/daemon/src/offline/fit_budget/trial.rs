@@ -48,10 +48,10 @@ impl Trial {
     ///
     /// # Errors
     /// A scene that is refused, or a body that no tool of the scene wakes particles of.
-    pub(super) fn new(path: &Path, text: &str) -> miette::Result<Self> {
+    pub(super) fn new(path: &Path, text: &str, limits: &Limits) -> miette::Result<Self> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let name = path.display().to_string();
-        let scene = parse(text, &name, Some(folder), &Limits::local(), &mut |_, _| ()).map_err(Report::new)?;
+        let scene = parse(text, &name, Some(folder), limits, &mut |_, _| ()).map_err(Report::new)?;
         let model = load::build_showing(&scene, None, &mut |_| ())?;
         let touch = served(&model).first_touch(&scene).ok_or_else(|| {
             miette::miette!(

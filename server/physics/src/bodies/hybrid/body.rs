@@ -67,6 +67,8 @@ pub struct HybridBody {
     pub(super) skin_influence: SkinInfluence,
     /// Bounding boxes of the skin's triangles.
     pub(super) clusters: SkinClusters,
+    /// The same in the order of walls that may meet; none where there are no walls.
+    pub(super) wall_clusters: SkinClusters,
     pub(super) densities_kg_per_m3: Vec<f64>,
     embedding: EmbeddingSummary,
     /// The embedding mesh: the coarse mesh, its boundary moved so that it holds the particles.
@@ -174,6 +176,7 @@ impl HybridBody {
             skin_carriers,
             vertex_points,
             clusters: SkinClusters::default(),
+            wall_clusters: SkinClusters::default(),
             embedding,
             partition,
             masses,
@@ -304,6 +307,13 @@ impl HybridBody {
     /// Computes the bounding boxes of the skin's triangles, given in the order of contact's broad phase.
     pub(crate) fn cluster(&mut self, triangles: &[[u32; 3]]) {
         self.clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
+    }
+
+    /// Finds what clusters of walls follow, given their triangles in the order of self-contact. Returns how many nodes they follow, each counted
+    /// with each of its clusters.
+    pub(crate) fn cluster_walls(&mut self, triangles: &[[u32; 3]]) -> usize {
+        self.wall_clusters = SkinClusters::new(self, self.skin_rest_m(), triangles);
+        self.wall_clusters.followed()
     }
 
     /// Returns the particles that carry a vertex of the skin, with their weights, of which none is zero.

@@ -57,10 +57,18 @@ impl HybridBody {
             } else {
                 SkinFollows::StiffElements
             },
-            carriers: MostCarriers { nodes: hybrid.node_count(), active: hybrid.particles().most_active },
+            carriers: MostCarriers {
+                nodes: hybrid.node_count(),
+                active: hybrid.particles().most_active,
+                of_clusters: 0,
+            },
         };
-        let contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
+        let mut contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
         hybrid.cluster(contact.triangles());
+        if let Some(walls) = contact.walls() {
+            let followed = hybrid.cluster_walls(walls.triangles());
+            contact = contact.with_walls_following(followed);
+        }
         let stretch_sq = stiffening(&around.settings, &materials);
         let touched = if contact.nodal_stiffness_n_per_m.is_empty() {
             omega

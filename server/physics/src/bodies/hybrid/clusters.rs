@@ -11,7 +11,7 @@
 use super::{body::HybridBody, partition::NONE, skin_influence::amplification};
 use crate::contact::broad::{CLUSTER, GROUP, box_distance_m};
 use glam::DVec3;
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, ops::Range};
 
 /// Boxes at rest of clusters of triangles and of groups of clusters, with the coarse nodes that they follow.
 #[derive(Debug, Clone, Default)]
@@ -66,6 +66,33 @@ impl SkinClusters {
     /// Returns the number of clusters.
     pub(super) fn clusters(&self) -> usize {
         self.clusters.low_m.len()
+    }
+
+    /// Returns the number of nodes that clusters follow, each counted with each of its clusters.
+    pub(super) fn followed(&self) -> usize {
+        self.clusters.nodes.len()
+    }
+
+    /// Notes the displacements (m) of the nodes that a cluster follows, given all.
+    pub(super) fn remember(&self, cluster: usize, displacements_m: &[DVec3], then_m: &mut [DVec3]) {
+        let followed = self.clusters.followed(cluster);
+        for (then_m, &node) in then_m[followed.clone()].iter_mut().zip(&self.clusters.nodes[followed]) {
+            *then_m = displacements_m[node as usize];
+        }
+    }
+
+    /// Returns a bound of how far (m) any vertex of a cluster that no active particle carries, then or now, has moved since:
+    /// `a max_i |u_i − u_i,then|`.
+    pub(super) fn moved_m(&self, cluster: usize, displacements_m: &[DVec3], then_m: &[DVec3]) -> f64 {
+        let followed = self.clusters.followed(cluster);
+        let mut most_sq = 0.0;
+        for (then_m, &node) in then_m[followed.clone()].iter().zip(&self.clusters.nodes[followed]) {
+            let moved_sq = then_m.distance_squared(displacements_m[node as usize]);
+            if moved_sq > most_sq || moved_sq.is_nan() {
+                most_sq = moved_sq;
+            }
+        }
+        self.clusters.amplification[cluster] * most_sq.sqrt()
     }
 
     /// Returns the clusters that have a vertex which a particle carries.
@@ -153,8 +180,13 @@ impl Boxes {
         self.first_vertex.push(self.vertices.len() as u32);
     }
 
+    /// Returns which of `nodes` a box follows.
+    fn followed(&self, number: usize) -> Range<usize> {
+        self.first[number] as usize..self.first[number + 1] as usize
+    }
+
     fn distance_m(&self, number: usize, from_m: DVec3, bounds: &Displaced<'_>) -> f64 {
-        let nodes = &self.nodes[self.first[number] as usize..self.first[number + 1] as usize];
+        let nodes = &self.nodes[self.followed(number)];
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for &node in nodes {
             let u = bounds.displacements_m[node as usize];

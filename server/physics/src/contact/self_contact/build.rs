@@ -71,7 +71,7 @@ impl SelfContact {
     /// Returns an empty list with room for what may meet.
     pub(in crate::contact) fn no_walls(&self) -> NearWalls {
         let vertices = self.nodes.iter().filter(|at| at.stiffness_n_per_m > 0.0).count();
-        NearWalls::with_room(vertices, self.rest_m.len(), self.carriers)
+        NearWalls::with_room(vertices, self.rest_m.len(), self.clusters.len(), self.carriers)
     }
 
     /// Returns buffers.

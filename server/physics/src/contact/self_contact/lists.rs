@@ -1,6 +1,6 @@
 //! The vertices and triangles that may meet before the surface has moved some way, in a list that never grows.
 
-use crate::contact::{CarriersThen, MostCarriers, broad::ROUNDING_M};
+use crate::contact::{CarriersThen, ClustersThen, MostCarriers, broad::ROUNDING_M};
 use glam::DVec3;
 
 /// Most pairs that are listed, per vertex of the skin, and at least.
@@ -11,7 +11,7 @@ const AT_LEAST: usize = 4096;
 const AWAKE_FIRST: f64 = 0.04;
 const AWAKE: f64 = 0.2;
 /// Part of the way until the next query below which a list is made anew rather than looked after.
-const WORTH_KEEPING: f64 = 0.25;
+const WORTH_KEEPING: f64 = 0.1;
 /// Number of lists for one stride after it did not pay to list for several.
 const SHORT: u32 = 64;
 /// A way (m) that no surface moves between two queries.
@@ -48,6 +48,8 @@ pub(in crate::contact) struct NearWalls {
     then_m: Box<[DVec3]>,
     /// Where what carries the nodes was then, if they are vertices of a skin.
     pub(super) carriers_then: CarriersThen,
+    /// Where what carries each cluster was then.
+    pub(super) clusters_then: ClustersThen,
 }
 
 impl Default for NearWalls {
@@ -63,18 +65,24 @@ impl Default for NearWalls {
             awake_m: 0.0,
             then_m: Box::default(),
             carriers_then: CarriersThen::default(),
+            clusters_then: ClustersThen::default(),
         }
     }
 }
 
 impl NearWalls {
-    /// Makes room for pairs of so many vertices, among so many nodes, and for what carries these.
-    pub(super) fn with_room(vertices: usize, nodes: usize, carriers: MostCarriers) -> Self {
+    /// Makes room for pairs of so many vertices, among so many nodes of so many clusters, and for what carries these.
+    pub(super) fn with_room(vertices: usize, nodes: usize, clusters: usize, carriers: MostCarriers) -> Self {
         let room = (PAIRS_PER_VERTEX * vertices).max(AT_LEAST);
         let none = Pair { node: 0, triangle: 0, free_m: 0.0 };
         let then_m = vec![DVec3::ZERO; nodes].into_boxed_slice();
-        let carriers_then = CarriersThen::with_room(carriers);
-        Self { pairs: vec![none; room].into_boxed_slice(), then_m, carriers_then, ..Self::default() }
+        Self {
+            pairs: vec![none; room].into_boxed_slice(),
+            then_m,
+            carriers_then: CarriersThen::with_room(carriers),
+            clusters_then: ClustersThen::with_room(carriers, clusters),
+            ..Self::default()
+        }
     }
 
     /// Returns the pairs, sorted by vertex and then by triangle.
@@ -115,6 +123,16 @@ impl NearWalls {
             self.slack_m = slack_m;
         }
         is_good
+    }
+
+    /// Returns where (m) a node was when the list was made.
+    pub(super) fn then_m(&self, node: u32) -> DVec3 {
+        self.then_m[node as usize]
+    }
+
+    /// Returns how far (m) the surface may have moved from there for the list to be worth keeping.
+    pub(super) fn worth_keeping_m(&self) -> f64 {
+        (1.0 - WORTH_KEEPING) * self.whole_slack_m - ROUNDING_M
     }
 
     /// Returns how far (m) the farthest of nodes at `x` (m) is from where it was when the list was made.

@@ -25,6 +25,7 @@ mod bounds;
 mod build;
 mod compact;
 mod facing;
+mod farthest;
 mod gap;
 mod later;
 mod lists;

@@ -193,6 +193,20 @@ impl SelfContact {
         around.flat_map(|&triangle| self.triangles.nodes[triangle as usize]).any(|n| corners.contains(&n))
     }
 
+    pub(super) fn cluster_count(&self) -> usize {
+        self.clusters.len()
+    }
+
+    /// Returns the triangles in the order in which clusters are made of them.
+    pub(crate) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles.nodes
+    }
+
+    /// Takes clusters to follow so many nodes of what carries the skin, each counted with each of its clusters.
+    pub(in crate::contact) fn follow(&mut self, of_clusters: usize) {
+        self.carriers.of_clusters = of_clusters;
+    }
+
     /// Returns the number of vertices that are left out because the body lies against itself there at rest.
     pub(crate) fn left_out(&self) -> usize {
         self.left_out

@@ -31,14 +31,17 @@ impl ContactModel {
         if near.slack_m > 0.0 || near.is_still_good(|near| skin.moved_m(&near.carriers_then)) {
             return near.wakes_more();
         }
+        if near.is_still_good(|near| walls.farthest_m(skin, near)) {
+            return near.wakes_more();
+        }
         let mut x = std::mem::take(&mut scratch.walls.x);
         skin.place(&mut x);
-        let renewed = walls.renew(&x, scratch.exhaustive, near, &mut scratch.walls);
+        walls.query(&x, scratch.exhaustive, near, &mut scratch.walls);
+        near.remember(&x);
         scratch.walls.x = x;
-        if renewed {
-            skin.remember(&mut near.carriers_then);
-        }
-        renewed || contact.walls.wakes_more()
+        skin.remember(&mut near.carriers_then);
+        (0..walls.cluster_count()).for_each(|cluster| skin.remember_walls(cluster, &mut near.clusters_then));
+        true
     }
 
     /// Presses the walls of a skin whose listed vertices are at `x` (m), and adds the forces (N) on vertices.

@@ -3,7 +3,7 @@ use super::{BodyKind, Compiled, Ingredients, mass_kg};
 use crate::{
     compile::{
         Files,
-        body::{Body, shape_fault},
+        body::{Body, implausible_size, shape_fault},
         check,
         loads::Constraints,
         located::Located,
@@ -59,7 +59,7 @@ impl BodyKind for Hybrid {
         let skin = if let Some(skin) = body.skin.take() {
             skin
         } else {
-            demand(wanted, body, files.limits)?;
+            demand(wanted, table, body, files.limits)?;
             skin_of(table, body, wanted.longest_edge_m()).map_err(|error| shape_fault(at, error))?
         };
         put_on(body, table, skin);
@@ -142,12 +142,13 @@ pub(in crate::compile) fn skin_around(
     make: impl FnOnce(f64) -> Result<FineSurface, Fault>,
 ) -> Result<Option<FineSurface>, Fault> {
     let Some(wanted) = &table.particles else { return Ok(None) };
-    demand(wanted, body, files.limits)?;
-    make(wanted.spacing_m).map(Some)
+    demand(wanted, table, body, files.limits)?;
+    make(wanted.longest_edge_m()).map(Some)
 }
 
-/// Refuses numbers out of range, and a lattice too fine or too coarse for the body, before it is laid.
-fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fault> {
+/// Refuses numbers out of range, and a lattice too fine or too coarse for the body, before it is laid. A body of an implausible size was
+/// probably given in another unit: then that is what is told.
+fn demand(table: &ParticlesTable, of_body: &BodyTable, body: &Body, limits: &Limits) -> Result<(), Fault> {
     let (key, spacing_m) = (at().key("spacing_m"), table.spacing_m);
     check(&key, spacing_m, spacing_m > 0.0, "must be larger than 0")?;
     let most_ok = (1..=MOST_ACTIVE).contains(&(table.most_active as usize));
@@ -160,7 +161,8 @@ fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fa
         check(&at().key("fine_depth_m"), depth_m, depth_m >= 0.0, "must not be negative")?;
     }
     if let Some(reach_m) = table.reach_m {
-        check(&at().key("reach_m"), reach_m, reach_m > 0.0, "must be larger than 0")?;
+        let (key, ok) = (at().key("reach_m"), reach_m >= spacing_m);
+        check(&key, reach_m, ok, "must be no smaller than the spacing, or no particle would wake")?;
     }
     let (low, high) = body.mesh.bounds_m();
     let smallest_m = (high - low).min_element();
@@ -168,7 +170,9 @@ fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fa
         let message = format!(
             "{key} = {spacing_m}: the lattice is coarser than the body, whose smallest extent is {smallest_m:.3e} m"
         );
-        return Err(Fault::value(key, message).help("take a spacing with several particles through the thinnest part"));
+        let help = implausible_size(of_body, body)
+            .unwrap_or_else(|| "take a spacing with several particles through the thinnest part".to_owned());
+        return Err(Fault::value(key, message).help(help));
     }
     let mesh = body.tets()?;
     let boundary_m2: f64 = body.triangles().map(|corners| area_m2(corners, body.mesh.positions_m())).sum();
@@ -186,7 +190,8 @@ fn demand(table: &ParticlesTable, body: &Body, limits: &Limits) -> Result<(), Fa
             let (key, help) = if of_skin { (at().key("skin_edge_m"), "edge") } else { (key, "spacing") };
             let message =
                 format!("{key} = {value} gives about {count:.1e} {what}; at most {most:.0e} are allowed here");
-            return Err(Fault::value(key, message).help(format!("take a larger {help}")));
+            let help = implausible_size(of_body, body).unwrap_or_else(|| format!("take a larger {help}"));
+            return Err(Fault::value(key, message).help(help));
         }
     }
     Ok(())
@@ -261,7 +266,7 @@ fn limit_poisson_ratios(table: &ParticlesTable, regions: &mut [Region]) -> Resul
                 "the material \"{}\" has Poisson's ratio {}; it is taken to have {}, and to be as stiff beneath a tool, as its waves of volume would ask for \
                  many more substeps: most_poisson_ratio = 0.5 in [body.particles] leaves it as it is, and poisson_ratio = {} with young_modulus_pa = {} says what is taken",
                 region.name,
-                short(lame.poisson_ratio()),
+                not_rounded_up_to_half(lame.poisson_ratio()),
                 short(most),
                 short(most),
                 short(region.material.lame.young_modulus_pa())
@@ -269,6 +274,12 @@ fn limit_poisson_ratios(table: &ParticlesTable, regions: &mut [Region]) -> Resul
         })
     };
     Ok(regions.iter_mut().filter_map(limit).collect())
+}
+
+/// A Poisson's ratio for people; one that rounding would take to be 0.5, which none may be, is told with all its digits.
+fn not_rounded_up_to_half(poisson_ratio: f64) -> String {
+    let told = short(poisson_ratio);
+    if told == "0.5" { poisson_ratio.to_string() } else { told }
 }
 
 /// What bodies with particles cannot have, at its key.

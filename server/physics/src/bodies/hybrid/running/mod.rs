@@ -72,6 +72,7 @@ pub(crate) struct RunningPatch {
     /// Whether active particles carry any vertex of each cluster, and of each group.
     carries_of_cluster: Vec<bool>,
     carries_of_group: Vec<bool>,
+    carries_of_walls: Vec<bool>,
     is_awake: Vec<bool>,
     is_viscous: bool,
     /// Number of sets of active particles that there have been.
@@ -128,6 +129,7 @@ impl RunningPatch {
             point_of: vec![NONE; partition.particle_count()],
             carries_of_cluster: vec![false; hybrid.clusters.clusters()],
             carries_of_group: vec![false; hybrid.clusters.groups()],
+            carries_of_walls: vec![false; hybrid.wall_clusters.clusters()],
             is_awake: vec![false; partition.cells().len()],
             is_viscous: hybrid.materials.iter().any(|m| !m.viscosity.is_zero()),
             number: 0,
@@ -200,6 +202,11 @@ impl RunningPatch {
     /// Returns the same for a group.
     pub(super) fn carries_of_group(&self, group: usize) -> bool {
         self.carries_of_group[group]
+    }
+
+    /// Returns the same for a cluster of walls.
+    pub(super) fn carries_of_walls(&self, cluster: usize) -> bool {
+        self.carries_of_walls[cluster]
     }
 
     /// Returns the awake cells, ascending.
@@ -285,6 +292,9 @@ impl RunningPatch {
             for cluster in hybrid.clusters.carried_by(particle) {
                 self.carries_of_cluster[cluster] = carried;
                 self.carries_of_group[SkinClusters::group_of(cluster)] = carried;
+            }
+            for cluster in hybrid.wall_clusters.carried_by(particle) {
+                self.carries_of_walls[cluster] = carried;
             }
         }
     }
