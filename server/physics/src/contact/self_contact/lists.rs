@@ -11,7 +11,7 @@ const AT_LEAST: usize = 4096;
 const AWAKE_FIRST: f64 = 0.04;
 const AWAKE: f64 = 0.2;
 /// Part of the way until the next query below which a list is made anew rather than looked after.
-const WORTH_KEEPING: f64 = 0.1;
+const WORTH_KEEPING: f64 = 0.25;
 /// Number of lists for one stride after it did not pay to list for several.
 const SHORT: u32 = 64;
 /// A way (m) that no surface moves between two queries.
