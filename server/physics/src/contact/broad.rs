@@ -103,11 +103,6 @@ pub(crate) trait Skin {
     /// Returns the position (m) of a vertex.
     fn position_m(&self, vertex: u32) -> DVec3;
 
-    /// Writes the positions (m) of all vertices.
-    fn place(&self, x: &mut [DVec3]) {
-        (0..).zip(x).for_each(|(vertex, x_m)| *x_m = self.position_m(vertex));
-    }
-
     /// Notes where what carries the skin is.
     fn remember(&self, _: &mut CarriersThen) {}
 

@@ -47,7 +47,7 @@ pub use proxy::SubstepTime;
 pub(crate) use resting::{Pressing, RestingContact};
 pub use sample_potential::SamplePotential;
 pub use self_contact::MeetingWalls;
-pub(crate) use self_contact::SelfContact;
+pub(crate) use self_contact::{SelfContact, coarse_walls};
 pub(crate) use skin_at_rest::{SkinAtRest, SkinFollows};
 pub(crate) use spring::SaturatingSpring;
 pub use state::ContactState;

@@ -54,6 +54,18 @@ impl Surface {
         Self { vertex_of_node: nodes.clone(), nodes, triangles }
     }
 
+    /// A surface of some of so many nodes: those of the triangles, which are given by their nodes.
+    pub(crate) fn of_some(nodes: usize, triangles: &[[u32; 3]]) -> Self {
+        let mut vertex_of_node = vec![u32::MAX; nodes];
+        triangles.iter().flatten().for_each(|&node| vertex_of_node[node as usize] = 0);
+        let used: Vec<u32> = (0..nodes as u32).filter(|&node| vertex_of_node[node as usize] == 0).collect();
+        for (vertex, &node) in (0..).zip(&used) {
+            vertex_of_node[node as usize] = vertex;
+        }
+        let triangles = triangles.iter().map(|corners| corners.map(|node| vertex_of_node[node as usize])).collect();
+        Self { nodes: used, triangles, vertex_of_node }
+    }
+
     /// Nodes of a triangle.
     pub fn triangle_nodes(&self, triangle: usize) -> [u32; 3] {
         self.triangles[triangle].map(|vertex| self.nodes[vertex as usize])

@@ -43,8 +43,9 @@ impl HybridBody {
         hybrid.max_natural_frequency_rad_per_s = omega;
         let vertices = hybrid.skin_rest_m().len() as u32;
         let moduli_pa: Vec<DVec2> = (0..vertices).map(|v| moduli::moduli_pa(hybrid.material_at(v))).collect();
-        let (moduli, mass_kg) = (moduli::mean_over_corners(&moduli_pa, &surface), hybrid.vertex_masses_kg());
-        let bearing_kg = hybrid.bearing_masses_kg();
+        let moduli = moduli::mean_over_corners(&moduli_pa, &surface);
+        let mass_kg = hybrid.vertex_masses_kg(&surface.triangles);
+        let bearing_kg = hybrid.bearing_masses_kg(&surface.nodes);
         let skin = SkinAtRest {
             positions_m: hybrid.skin_rest_m(),
             surface: &surface,
@@ -63,7 +64,8 @@ impl HybridBody {
                 of_clusters: 0,
             },
         };
-        let mut contact = ContactModel::build(&skin, &around.tools).with_walls(around.walls_of(&skin));
+        let walls = hybrid.walls(&skin, &moduli_pa, &around);
+        let mut contact = ContactModel::build(&skin, &around.tools).with_walls(walls);
         hybrid.cluster(contact.triangles());
         if let Some(walls) = contact.walls() {
             let followed = hybrid.cluster_walls(walls.triangles());

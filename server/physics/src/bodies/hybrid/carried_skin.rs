@@ -230,67 +230,6 @@ impl HybridBody {
         let rest_m = self.skin_rest_m()[vertex as usize];
         rest_m + self.carriers_of_vertex(vertex).iter().map(|&(p, w)| moved(p) * w).sum::<DVec3>()
     }
-
-    /// Returns the masses (kg) that contact may take for those of the skin's vertices: with the area `A_v` of a vertex,
-    /// `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`. Each of a vertex's particles then bears what a
-    /// foundation does to the vertex per area.
-    pub(crate) fn vertex_masses_kg(&self) -> Vec<f64> {
-        let skin = &self.particles.skin;
-        let mut vertex_m2 = vec![0.0; self.vertex_points.len()];
-        for triangle in 0..skin.triangles().len() {
-            let [a, b, c] = skin.corners_m(triangle);
-            let third = (b - a).cross(c - a).length() / 6.0;
-            skin.triangles()[triangle].iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
-        }
-        let vertices = 0..self.vertex_points.len() as u32;
-        let points = || vertices.clone().map(|vertex| self.carriers_of_vertex(vertex)).zip(&vertex_m2);
-        let mut particle_m2 = vec![0.0; self.partition.particle_count()];
-        for (carriers, area_m2) in points() {
-            for &(particle, weight) in carriers {
-                particle_m2[particle as usize] += weight.max(0.0) * area_m2;
-            }
-        }
-        let per_area = |particle: u32| self.masses.particle_kg[particle as usize] / particle_m2[particle as usize];
-        let of_vertex = |(carriers, area_m2): (&[(u32, f64)], &f64)| {
-            let carriers = carriers.iter().filter(|(_, weight)| *weight > 1e-6);
-            area_m2 * carriers.map(|(particle, _)| per_area(*particle)).fold(f64::INFINITY, f64::min)
-        };
-        points().map(of_vertex).collect()
-    }
-
-    /// Returns the masses (kg) by which what is pressed at the skin's vertices is borne where neighbours are pressed alike:
-    /// `min_p m_p/Σ_v w_vp` over the particles of each. Unlike [`Self::vertex_masses_kg`] it knows no areas: a vertex of
-    /// small triangles is borne by the same particles as its neighbours.
-    pub(crate) fn bearing_masses_kg(&self) -> Vec<f64> {
-        let points = || (0..self.vertex_points.len() as u32).map(|vertex| self.carriers_of_vertex(vertex));
-        let mut shares = vec![0.0; self.partition.particle_count()];
-        for carriers in points() {
-            for &(particle, weight) in carriers {
-                shares[particle as usize] += weight.max(0.0);
-            }
-        }
-        let of_vertex = |carriers: &[(u32, f64)]| {
-            let carriers = carriers.iter().filter(|(_, weight)| *weight > 1e-6);
-            let each = carriers.map(|(p, _)| self.masses.particle_kg[*p as usize] / shares[*p as usize]);
-            each.fold(f64::INFINITY, f64::min)
-        };
-        points().map(of_vertex).collect()
-    }
-
-    /// Returns the springs (N/m) at vertices of the skin as their particles feel them: the row sums of
-    /// `Σ_v k_v w_v w_vᵀ`.
-    pub(crate) fn particle_springs_n_per_m(&self, of_vertices_n_per_m: &[f64]) -> Vec<f64> {
-        let mut springs = vec![0.0; self.partition.particle_count()];
-        for ((vertex, point), stiffness) in (0..).zip(&self.vertex_points).zip(of_vertices_n_per_m) {
-            let carriers = self.carriers_of_vertex(vertex);
-            let of_carriers = || carriers.iter().map(|(_, weight)| weight.abs()).sum();
-            let amplification = if self.particles.smooth_skin { of_carriers() } else { point.amplification() };
-            for &(particle, weight) in carriers {
-                springs[particle as usize] += stiffness * weight.abs() * amplification;
-            }
-        }
-        springs
-    }
 }
 
 #[cfg(test)]
@@ -374,10 +313,9 @@ mod tests {
         let clusters = body.wall_clusters.clusters();
         let mut told = 0;
         let mut random = Random(17);
-        let place = |patch: &RunningPatch| {
-            let mut x = vec![DVec3::NAN; body.skin_rest_m().len()];
-            SkinView::new(body, patch).place(&mut x);
-            x
+        let vertices = body.skin_rest_m().len() as u32;
+        let place = |patch: &RunningPatch| -> Vec<DVec3> {
+            (0..vertices).map(|vertex| SkinView::new(body, patch).position_m(vertex)).collect()
         };
         for (before, after) in sets.iter().flat_map(|before| sets.iter().map(move |after| (before, after))) {
             for size_m in [1e-6, 1e-3] {

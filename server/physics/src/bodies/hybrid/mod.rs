@@ -38,6 +38,7 @@ pub mod sizes;
 pub mod skin;
 mod skin_carriers;
 mod skin_influence;
+mod skin_masses;
 pub mod spec;
 mod staged_patch;
 mod state;
@@ -48,6 +49,7 @@ pub(crate) mod switching;
 pub(crate) mod testing;
 mod transition_force;
 pub mod trilinear_point;
+mod walls;
 
 pub use body::HybridBody;
 pub(crate) use scratch::HybridScratch;

@@ -111,6 +111,11 @@ impl NearWalls {
         self.then_m.copy_from_slice(x);
     }
 
+    /// Notes where (m) some of them are, if no others are asked for.
+    pub(super) fn remember_some(&mut self, x: &[DVec3], nodes: impl Iterator<Item = u32>) {
+        nodes.for_each(|node| self.then_m[node as usize] = x[node as usize]);
+    }
+
     /// Looks, where the surface's travel has used the list up, how far (m) it really is from where it was: what trembles
     /// travels far and goes nowhere. Returns whether the list is good for some time after all.
     pub(super) fn is_still_good(&mut self, moved_m: impl FnOnce(&Self) -> f64) -> bool {

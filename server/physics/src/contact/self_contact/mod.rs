@@ -23,6 +23,7 @@
 //! frequency ([`crate::tick`]'s substeps); no vertex at its margin adds more than [`rest::FREQUENCY_FRACTION`] of it.
 mod bounds;
 mod build;
+mod coarse;
 mod compact;
 mod facing;
 mod farthest;
@@ -38,6 +39,7 @@ mod stepping;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use coarse::coarse_walls;
 pub(super) use lists::NearWalls;
 pub use press::MeetingWalls;
 pub(super) use query::WallScratch;

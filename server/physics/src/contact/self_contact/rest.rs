@@ -202,6 +202,11 @@ impl SelfContact {
         &self.triangles.nodes
     }
 
+    /// Returns the vertices of its triangles, in the order of clusters.
+    pub(super) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..self.clusters.len()).flat_map(|cluster| self.of_cluster.row(cluster)).copied()
+    }
+
     /// Takes clusters to follow so many nodes of what carries the skin, each counted with each of its clusters.
     pub(in crate::contact) fn follow(&mut self, of_clusters: usize) {
         self.carriers.of_clusters = of_clusters;

@@ -35,9 +35,9 @@ impl ContactModel {
             return near.wakes_more();
         }
         let mut x = std::mem::take(&mut scratch.walls.x);
-        skin.place(&mut x);
+        walls.vertices().for_each(|vertex| x[vertex as usize] = skin.position_m(vertex));
         walls.query(&x, scratch.exhaustive, near, &mut scratch.walls);
-        near.remember(&x);
+        near.remember_some(&x, walls.vertices());
         scratch.walls.x = x;
         skin.remember(&mut near.carriers_then);
         (0..walls.cluster_count()).for_each(|cluster| skin.remember_walls(cluster, &mut near.clusters_then));
