@@ -316,7 +316,7 @@ fn sheet(rings: i32, refinement: Option<Refinement>, along: DVec3) -> ModelSpec 
             refinement,
             table: None,
         }),
-        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3], is_fixed: false }],
         loads: Vec::<LoadSpec>::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec { shape, ..sphere(radius_m, DVec3::Z * 0.01, Coupling::Rigid) }],

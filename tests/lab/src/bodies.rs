@@ -44,7 +44,7 @@ pub fn spec(shape: &Shape, material: Material, tool: Option<ToolSpec>) -> ModelS
             .into(),
         ),
         prescribed: base
-            .map(|nodes| PrescribedSpec { name: "base".into(), nodes, axes: [true; 3] })
+            .map(|nodes| PrescribedSpec { name: "base".into(), nodes, axes: [true; 3], is_fixed: false })
             .into_iter()
             .collect(),
         loads: vec![],

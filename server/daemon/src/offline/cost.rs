@@ -43,23 +43,24 @@ pub(super) struct AwakeCost {
 pub(super) fn measure(scene: &Scene, model: &Model) -> miette::Result<Cost> {
     // What counts is a tick that is computed, not one that is slept through.
     if scene.model.settings.sleep_tolerance_m > 0.0 {
-        let mut awake = scene.clone();
-        awake.model.settings.sleep_tolerance_m = 0.0;
-        let model = load::build(&awake)?;
-        let mut run = Run::new(&awake, &model)?;
-        let all = run_for(&mut run, &awake, &model)?;
-        return Ok(Cost { all, awake: None, inverted: run.inverted() });
+        let mut never_asleep = scene.clone();
+        never_asleep.model.settings.sleep_tolerance_m = 0.0;
+        return of_ticks(&never_asleep, &load::build(&never_asleep)?);
     }
+    of_ticks(scene, model)
+}
+
+/// Does it with a scene whose body never sleeps as a whole.
+fn of_ticks(scene: &Scene, model: &Model) -> miette::Result<Cost> {
     let mut run = Run::new(scene, model)?;
     let all = run_for(&mut run, scene, model)?;
     let inverted = run.inverted();
     let (tick_wall_us, ticks, most) = run.cost_awake();
-    let awake = if ticks >= ENOUGH_TICKS && served(model).wakes_particles_for_tools() {
-        Some(AwakeCost { tick_wall_us, ticks, most, touched_m: None })
-    } else {
-        touched(scene, model)?
-    };
-    Ok(Cost { all, awake, inverted })
+    if ticks >= ENOUGH_TICKS && served(model).wakes_particles_for_tools() {
+        return Ok(Cost { all, awake: Some(AwakeCost { tick_wall_us, ticks, most, touched_m: None }), inverted });
+    }
+    let Some((awake, inverted_there)) = touched(scene, model)? else { return Ok(Cost { all, awake: None, inverted }) };
+    Ok(Cost { all, awake, inverted: inverted.or(inverted_there) })
 }
 
 fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
@@ -73,17 +74,19 @@ fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<Ti
     }
 }
 
-/// Ticks of the body with its first tool in a light touch; `None` where it wakes no particles there.
-fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<AwakeCost>> {
+/// Ticks of the body with its first tool in a light touch, if it wakes particles there, and what turned inside out; `None` where no tool can
+/// touch it.
+fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<(Option<AwakeCost>, Option<String>)>> {
     let Some(touch) = served(model).first_touch(scene) else { return Ok(None) };
     let mut run = Run::new(scene, model)?;
     let depth_m = run.touch(&touch);
     let started = Instant::now();
     let is_enough = |ticks: u64, passed: Duration| passed >= PATIENCE || (passed >= BUDGET && ticks >= ENOUGH_TICKS);
     while !is_enough(run.state.mechanical.tick, started.elapsed()) {
-        run.tick();
+        run.tick_and_look();
         run.refuse_quarantined()?;
     }
     let (tick_wall_us, ticks, most) = run.cost_awake();
-    Ok((ticks > 0).then_some(AwakeCost { tick_wall_us, ticks, most, touched_m: Some(depth_m) }))
+    let awake = (ticks > 0).then_some(AwakeCost { tick_wall_us, ticks, most, touched_m: Some(depth_m) });
+    Ok(Some((awake, run.inverted())))
 }

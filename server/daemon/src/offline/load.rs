@@ -12,7 +12,7 @@ use thiserror::Error;
 /// The physics' refusal of a scene.
 #[derive(Debug, Error, Diagnostic)]
 #[error("the scene \"{scene}\" cannot be simulated")]
-struct Refused {
+pub(super) struct Refused {
     scene: String,
     /// `palpated check` itself shows the body before it is refused.
     #[help]

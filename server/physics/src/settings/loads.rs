@@ -33,4 +33,6 @@ pub struct PrescribedSpec {
     pub nodes: Vec<u32>,
     /// Which of x, y, z are prescribed.
     pub axes: [bool; 3],
+    /// Whether what is prescribed is always zero, so that sets of different axes hold what lies between them together.
+    pub is_fixed: bool,
 }

@@ -131,7 +131,7 @@ pub(crate) fn triangles_where(mesh: &TetMesh, condition: impl Fn(DVec3) -> bool)
 
 /// Prescribed axes of the nodes that satisfy a condition.
 pub(crate) fn held(mesh: &TetMesh, name: &str, axes: [bool; 3], condition: impl Fn(DVec3) -> bool) -> PrescribedSpec {
-    PrescribedSpec { name: name.into(), nodes: nodes_where(mesh, condition), axes }
+    PrescribedSpec { name: name.into(), nodes: nodes_where(mesh, condition), axes, is_fixed: false }
 }
 
 pub(crate) fn material(law: Law, young_pa: f64, poisson: f64) -> Material {

@@ -110,7 +110,7 @@ pub fn nodes_where(mesh: &TetMesh, wanted: impl Fn(DVec3) -> bool) -> Vec<u32> {
 }
 
 pub fn hold(name: &str, nodes: Vec<u32>, axes: [bool; 3]) -> PrescribedSpec {
-    PrescribedSpec { name: name.into(), nodes, axes }
+    PrescribedSpec { name: name.into(), nodes, axes, is_fixed: false }
 }
 
 /// A block of `2a × 2a × a` whose upper face has the origin in its middle, a stable neo-Hookean solid of 10 kPa: 24 n³ coarse tets, and particles as

@@ -35,7 +35,7 @@ pub fn sheet(rings: i32, refinement: Option<Refinement>) -> ModelSpec {
             refinement,
             table: None,
         }),
-        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3], is_fixed: false }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![sphere(3e-3, DVec3::Z * 0.01, Coupling::Rigid)],

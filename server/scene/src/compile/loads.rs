@@ -50,7 +50,7 @@ pub(crate) fn constraints(document: &Document, regions: &Regions<'_>, files: &Fi
         let nodes = regions.nodes(&table.region, &at.key("region"))?;
         let name = table.name.clone().unwrap_or_else(|| table.region.clone());
         claim(&mut owner, &nodes, axes, &name, &at)?;
-        constraints.specs.push(PrescribedSpec { name, nodes, axes });
+        constraints.specs.push(PrescribedSpec { name, nodes, axes, is_fixed: false });
         constraints.motions.push(PrescribedMotion {
             displacement_m: DVec3::from(table.displacement_m),
             amplitude: amplitude::compile(&table.amplitude, &at.key("amplitude"), files)?,
@@ -68,7 +68,8 @@ impl Constraints {
         }
         for (axes, nodes) in by_axes {
             let letters: String = "xyz".chars().zip(axes).filter(|(_, held)| *held).map(|(letter, _)| letter).collect();
-            self.specs.push(PrescribedSpec { name: format!("fixed {letters}"), nodes, axes });
+            let name = format!("fixed {letters}");
+            self.specs.push(PrescribedSpec { name, nodes, axes, is_fixed: true });
             self.motions.push(PrescribedMotion { displacement_m: DVec3::ZERO, amplitude: Amplitude::Constant(0.0) });
         }
     }

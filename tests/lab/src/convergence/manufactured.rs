@@ -153,7 +153,7 @@ fn loaded(mesh: TetMesh, boundary: Vec<u32>, material: Material, rule: &[([f64; 
             }
             .into(),
         ),
-        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3], is_fixed: false }],
         loads: vec![LoadSpec::NodalForces((0u32..).zip(forces).collect())],
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![],

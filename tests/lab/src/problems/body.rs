@@ -153,7 +153,7 @@ impl TetBody {
 }
 
 fn held(name: &str, nodes: Vec<u32>, axes: [bool; 3]) -> PrescribedSpec {
-    PrescribedSpec { name: name.into(), nodes, axes }
+    PrescribedSpec { name: name.into(), nodes, axes, is_fixed: false }
 }
 
 fn region<'a>(shape: &'a shapes::Shape, name: &str) -> Result<&'a BoundaryRegion> {

@@ -149,5 +149,5 @@ pub(super) fn solid(spec: &ModelSpec) -> &Solid {
 
 /// Nodes held in all directions.
 pub(super) fn hold(name: &str, nodes: Vec<u32>) -> PrescribedSpec {
-    PrescribedSpec { name: name.into(), nodes, axes: [true; 3] }
+    PrescribedSpec { name: name.into(), nodes, axes: [true; 3], is_fixed: false }
 }

@@ -151,7 +151,7 @@ fn sheet(
     let radius_m = touch.radius * EDGE_M;
     let model = Model::build(ModelSpec {
         body: BodySpec::MassSpring(MassSpringSpec { springs, refinement, table }),
-        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3] }],
+        prescribed: vec![PrescribedSpec { name: "boundary".into(), nodes: boundary, axes: [true; 3], is_fixed: false }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec {

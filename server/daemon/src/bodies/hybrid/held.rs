@@ -11,8 +11,10 @@ const NONE: f64 = 1e-3;
 pub(super) fn warnings(model: &Model, body: &HybridBody) -> Vec<String> {
     let sites = body.partition().sites();
     let in_spacings = |node: &u32| (model.rest_positions_m()[*node as usize] - sites.site_m(0)) / sites.spacing_m();
+    // Held particles have nodes of their own, which lie before and beyond the region.
+    let of_mesh = body.coarse().positions_m().len() as u32;
     let words = |set: &PrescribedSpec| {
-        let off = off_planes(set.nodes.iter().map(in_spacings))?;
+        let off = off_planes(set.nodes.iter().filter(|node| **node < of_mesh).map(in_spacings))?;
         Some(format!(
             "what is held as \"{}\" is flat and lies {} mm off the planes of the particles' lattice: the body is up to a spacing ({} mm) too long or too \
              short there; choose a spacing that divides its distance from the other held region",

@@ -8,7 +8,7 @@ mod scene_text;
 mod search;
 mod trial;
 
-use super::{args::positive, interrupt::Interrupt, say::say, summary::Percentiles};
+use super::{args::positive, interrupt::Interrupt, load::Refused, say::say, summary::Percentiles};
 use crate::progress::Progress;
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::bodies::hybrid::spec::MOST_ACTIVE;
@@ -145,7 +145,12 @@ impl Search<'_> {
                 least_us = least_us.min(pressed.tick_wall_us.p50);
                 let fits = pressed.tick_wall_us.p50 <= budget_us;
                 Ok::<_, miette::Report>((Fitting { numbers, coarse_tets, pressed }, fits))
-            })?;
+            });
+            let largest = match largest {
+                // The body cannot be filled with so many tets, or they are too small beside its particles.
+                Err(error) if !fitting.is_empty() && cannot_be_built(&error) => break,
+                largest => largest?,
+            };
             // More tets take longer still.
             let Some((_, found)) = largest else { break };
             fitting.push(found);
@@ -229,6 +234,12 @@ impl Search<'_> {
         let trial = self.trial(numbers, &self.text.with_all(numbers))?;
         Ok((trial.coarse_tets(), trial.press()?))
     }
+}
+
+/// Whether a body cannot be made of its numbers, or is refused.
+fn cannot_be_built(error: &miette::Report) -> bool {
+    let stage = error.downcast_ref().map(SceneError::stage);
+    matches!(stage, Some(Stage::Body | Stage::Model)) || error.is::<Refused>()
 }
 
 fn two_significant(value: f64) -> f64 {

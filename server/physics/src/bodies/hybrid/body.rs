@@ -4,6 +4,7 @@ use super::{
     clusters::SkinClusters,
     composite::{Composite, NO_WEIGHT},
     embedding_mesh::{self, EmbeddingMesh},
+    held_edges,
     held_particles::{self, HeldParticles},
     masses::Masses,
     moments::{CellMoments, Moments, integrate},
@@ -25,7 +26,7 @@ use crate::{
         solid::Solid,
     },
     material::Material,
-    mesh::{Surface, TetMesh, tet::EDGES},
+    mesh::{Surface, TetMesh},
     settings::PrescribedSpec,
     tick::PrescribedNodes,
 };
@@ -131,7 +132,7 @@ impl HybridBody {
         }
         let EmbeddingMesh { mesh, moved_m, outside_m } = covering(mesh, surface, prescribed, &sites, &moments);
         let mut composite = Composite::new(&mesh);
-        let mut prescribed = with_edges(&mesh, surface, &composite, prescribed);
+        let mut prescribed = held_edges::with_edges(&mesh, surface, &composite, prescribed);
         let moments = match spec.fine_layers() {
             Some(layers) => merged(&sites, &composite, moments, layers, of_tet),
             None => moments,
@@ -331,37 +332,6 @@ impl HybridBody {
     pub fn embedding(&self) -> EmbeddingSummary {
         self.embedding
     }
-}
-
-/// Returns the prescribed sets, extended by the nodes in the middle of edges: where all corners of a boundary triangle
-/// are in a set, so are the nodes in the middle of its edges.
-fn with_edges(
-    mesh: &TetMesh,
-    surface: &Surface,
-    composite: &Composite,
-    prescribed: &[PrescribedSpec],
-) -> Vec<PrescribedSpec> {
-    let extended = |set: &PrescribedSpec| {
-        let held: BTreeSet<u32> = set.nodes.iter().copied().collect();
-        let mut edges = BTreeSet::new();
-        for triangle in (0..surface.triangles.len()).map(|t| surface.triangle_nodes(t)) {
-            if triangle.iter().all(|n| held.contains(n)) {
-                let [a, b, c] = triangle;
-                edges.extend([[a.min(b), a.max(b)], [b.min(c), b.max(c)], [c.min(a), c.max(a)]]);
-            }
-        }
-        let mut middles = BTreeSet::new();
-        for (corners, nodes) in mesh.tets().iter().zip(composite.tets()) {
-            for (number, [a, b]) in EDGES.into_iter().enumerate() {
-                let edge = [corners[a].min(corners[b]), corners[a].max(corners[b])];
-                if edges.contains(&edge) {
-                    middles.insert(nodes[4 + number]);
-                }
-            }
-        }
-        PrescribedSpec { nodes: set.nodes.iter().copied().chain(middles).collect(), ..set.clone() }
-    };
-    prescribed.iter().map(extended).collect()
 }
 
 /// Merges the cells beneath so many layers, eight to one, where they are of one material.

@@ -82,7 +82,9 @@ impl Judged for SteppedHybrid<'_> {
     }
 
     fn put_back(&mut self) {
+        self.scratch.put_decay_back(self.own);
         self.scratch.put_long_steps_back(self.own);
+        self.scratch.transition.put_back(self.own);
     }
 
     fn note_long_step(&mut self, state: &MechanicalState) {

@@ -182,8 +182,8 @@ pub(super) struct LongStepHistory {
     /// Number of the tick's long steps that have begun.
     begun: u32,
     at_start: LongSteps,
+    /// The rest of the state of which a tick that is repeated, or refused, has to begin as it did.
     prestrain_at_start: Progress,
-    /// [`HybridState::given_j`] at the tick's start.
     given_at_start_j: f64,
 }
 
@@ -203,8 +203,6 @@ impl LongStepHistory {
 impl HybridScratch {
     /// Keeps the state of the long steps before a tick that may be repeated.
     pub(crate) fn keep_long_steps(&mut self, own: &mut HybridState, state: &MechanicalState) {
-        self.long_steps.prestrain_at_start = own.prestrain.progress();
-        self.long_steps.given_at_start_j = own.given_j;
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
         at_start.steady_n.clone_from(&own.long_steps.steady_n);
@@ -214,10 +212,20 @@ impl HybridScratch {
         }
     }
 
-    /// Restores what [`Self::keep_long_steps`] kept, so that the tick can be taken again in more long steps.
-    pub(crate) fn put_long_steps_back(&mut self, own: &mut HybridState) {
+    /// Keeps what decays within a tick.
+    pub(super) fn keep_decay(&mut self, own: &HybridState) {
+        self.long_steps.prestrain_at_start = own.prestrain.progress();
+        self.long_steps.given_at_start_j = own.given_j;
+    }
+
+    /// Restores what [`Self::keep_decay`] kept.
+    pub(super) fn put_decay_back(&self, own: &mut HybridState) {
         own.prestrain.go_back(self.long_steps.prestrain_at_start);
         own.given_j = self.long_steps.given_at_start_j;
+    }
+
+    /// Restores what [`Self::keep_long_steps`] kept, so that the tick can be taken again in more long steps.
+    pub(crate) fn put_long_steps_back(&mut self, own: &mut HybridState) {
         let LongStepHistory { begun, at_start, .. } = &mut self.long_steps;
         *begun = 0;
         own.long_steps.steady_n.clone_from(&at_start.steady_n);

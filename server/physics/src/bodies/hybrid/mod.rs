@@ -14,6 +14,7 @@ pub mod embedding_mesh;
 mod energy;
 mod frequency;
 mod gradients;
+mod held_edges;
 mod held_particles;
 mod hourglass_growth;
 mod judged;

@@ -83,6 +83,7 @@ impl HybridScratch {
     /// Makes the patch that of the state's active particles and prestrains, where it is not. Allocates nothing.
     pub(super) fn follow(&mut self, body: &HybridBody, active: &HybridState) {
         if self.patch.active() != active.ids() {
+            self.transition.forget_due();
             self.patch.wake(body, active.ids(), &active.prestrain);
         } else if !self.patch.knows(&active.prestrain) {
             self.patch.put_prestrains(&active.prestrain);

@@ -203,6 +203,7 @@ impl KindState for HybridState {
         });
         self.prestrain.chain(chain);
         chain.vectors(&self.transition_force_n);
+        chain.vectors(&self.transition_taken_n);
         chain.real(self.given_j);
         chain.real(self.switched_j);
         self.long_steps.chain(chain);

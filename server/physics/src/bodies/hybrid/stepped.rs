@@ -73,9 +73,11 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         state.force_is_current = true;
     }
 
-    /// Forgets the energy that the last kick left: velocities have changed since.
+    /// Forgets the energy that the last kick left: velocities have changed since. Keeps the transition force, which is known by now, for
+    /// a repetition.
     fn begin_kicks(&mut self) {
         self.scratch.of_free_j = None;
+        self.scratch.transition.keep(self.own);
     }
 
     /// Kicks, `v ← (v e^{−c h/2} + h M'⁻¹ f) e^{−c h/2}`, and books the work in the ledger, as for a body of tets.
@@ -191,7 +193,14 @@ impl<'a> Stepped<'a> for SteppedHybrid<'a> {
         Some(self.body.prescribed_nodes())
     }
 
+    fn keep_last_good(&mut self) {
+        self.scratch.keep_decay(self.own);
+    }
+
+    /// Nothing accelerates any more, so no transition force is left.
     fn stop_at_last_good(&mut self) {
+        self.scratch.put_decay_back(self.own);
+        self.own.forget_transition_force();
         self.own.long_steps.forget();
     }
 }

@@ -39,12 +39,33 @@ pub(crate) struct TransitionForce {
     due_n: Vec<DVec3>,
     /// A buffer of accelerations (m/s²).
     accelerations: Vec<DVec3>,
+    /// The transition force (N) before a tick's first kick, as it is and as it was taken.
+    at_start_n: [Vec<DVec3>; 2],
 }
 
 impl TransitionForce {
     pub(super) fn with_room(entries: usize) -> Self {
         let list = || Vec::with_capacity(entries);
-        Self { before: list(), due_n: list(), accelerations: list() }
+        Self { before: list(), due_n: list(), accelerations: list(), at_start_n: [list(), list()] }
+    }
+
+    /// Keeps the transition force before a tick's first kick: a tick that is repeated has it again, though it ended within the tick.
+    pub(super) fn keep(&mut self, own: &HybridState) {
+        let [force_n, taken_n] = &mut self.at_start_n;
+        force_n.clone_from(&own.transition_force_n);
+        taken_n.clone_from(&own.transition_taken_n);
+    }
+
+    /// Puts back what [`Self::keep`] kept.
+    pub(super) fn put_back(&self, own: &mut HybridState) {
+        let [force_n, taken_n] = &self.at_start_n;
+        own.transition_force_n.clone_from(force_n);
+        own.transition_taken_n.clone_from(taken_n);
+    }
+
+    /// Forgets what the next evaluation was to find, since another state is to be stepped.
+    pub(super) fn forget_due(&mut self) {
+        self.due_n.clear();
     }
 
     /// Records the accelerations before a switch.
@@ -136,6 +157,12 @@ impl HybridState {
     pub(super) fn transition_work_j(&self, v: &[DVec3], factor: f64, accelerations: &[DVec3], h_s: f64) -> f64 {
         let power = |((taken, v), a): ((&DVec3, &DVec3), &DVec3)| taken.dot(*v * factor + *a * (0.5 * h_s));
         h_s * self.transition_taken_n.iter().zip(v).zip(accelerations).map(power).sum::<f64>()
+    }
+
+    /// Ends the transition force.
+    pub(super) fn forget_transition_force(&mut self) {
+        self.transition_force_n.clear();
+        self.transition_taken_n.clear();
     }
 
     /// Returns whether the decay gave little energy beside the elastic energy that switches changed lately.

@@ -11,7 +11,7 @@
 //! that momentum and angular momentum are conserved. The potential depends on positions alone: there is no history.
 //!
 //! *Which walls* a vertex may meet is settled at rest ([`rest`]): not those beside it along the skin, nor the other
-//! side of its own wall. Of the others those count that face it now. The margin is less than half of the gap at rest,
+//! side of its own wall. Of the others those count that face it now. The margin is at most half of the gap at rest,
 //! so that nothing is pressed there.
 //!
 //! *What it costs where nothing is near*: every cluster of triangles knows at rest how far the walls are that it may

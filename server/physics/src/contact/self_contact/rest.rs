@@ -152,8 +152,8 @@ pub(super) fn twice_area_m2([a, b, c]: [DVec3; 3]) -> DVec3 {
 
 impl SelfContact {
     /// Returns the distance (m) at rest of a vertex and a triangle that may ever meet, `None` of others. They may not
-    /// - where the straight way from one to the other goes into the material at both ends, and is no longer than the
-    ///   wall is thick there: the triangle is the other side of the vertex's own wall;
+    /// - where the straight way from one to the other goes into the material at both ends, and is shorter than twice
+    ///   the thickness of the wall there: the triangle is the other side of the vertex's own wall;
     /// - where they are beside each other along the skin, and do not face each other across a gap.
     pub(super) fn may_meet_m(&self, node: u32, triangle: usize) -> Option<f64> {
         let corners = self.triangles.nodes[triangle];

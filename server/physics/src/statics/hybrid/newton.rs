@@ -245,7 +245,7 @@ mod tests {
         let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         let held = |name: &str, z: f64| {
             let nodes = (0..mesh.positions_m().len() as u32).filter(|&n| mesh.positions_m()[n as usize].z == z);
-            PrescribedSpec { name: name.into(), nodes: nodes.collect(), axes: [true; 3] }
+            PrescribedSpec { name: name.into(), nodes: nodes.collect(), axes: [true; 3], is_fixed: false }
         };
         let lame = Lame::from_young_poisson(10e3, 0.0).unwrap();
         let mut spec = ModelSpec {
