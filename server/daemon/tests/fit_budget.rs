@@ -123,3 +123,19 @@ fn what_cannot_be_chosen_is_told_and_nothing_is_written() {
     let zero = fit(Path::new("heart"), &["--tick-us", "0"]);
     assert_eq!(zero.code, Some(2), "{}", zero.said);
 }
+
+/// A count of tets that the body cannot be made of, since more coarse nodes than particles would be asked for, ends the search and not the
+/// command.
+#[test]
+fn counts_of_tets_that_cannot_be_built_end_the_search() {
+    let (before, after) = SCENE.split_once("[body.box]\nsize_mm = [40, 40, 20]\ncells = [2, 2, 1]\n").unwrap();
+    let scene = format!("{before}[body.ventricle]\n{after}").replace("z_min", "base");
+    let (_folder, path) = file(&scene.replace("most_active = 60 # few", "spacing_mm = 1.5\nmost_active = 60"));
+    let ended = fit(&path, &["--tick-us", AMPLE]);
+    assert_eq!(ended.code, Some(0), "{}", ended.said);
+    let chosen: Vec<&str> = ended.text.lines().filter(|line| line.starts_with("target_tets = ")).collect();
+    assert_eq!(chosen.len(), 1, "{}", ended.text);
+    // Of six counts that are tried, some cannot be built, and one at least can.
+    let rows = ended.shown.lines().filter(|line| line.contains(" % ") && line.ends_with('%')).count();
+    assert!((1..6).contains(&rows), "{}", ended.shown);
+}

@@ -314,6 +314,20 @@ fn a_hybrid_body_is_checked_with_particles_awake() {
     let text = succeeds(&["check", &thin]);
     assert!(text.contains("warning: fine depth in [body.particles]: no cell is of twice the spacing"), "{text}");
     assert_eq!(palpated(&["check", &thin, "--strict"]).status.code(), Some(1));
+    // A body that may sleep as a whole is measured with particles awake, too.
+    let sleeping = fs::read_to_string(folder.path().join("far.toml")).unwrap()
+        + "[numerics]\nmass_damping_per_s = 15\nsleep_tolerance_um = 1\n";
+    let path = folder.path().join("sleeping.toml");
+    fs::write(&path, sleeping).unwrap();
+    let text = succeeds(&["check", path.to_str().unwrap()]);
+    assert!(text.contains(" particles awake, the first tool pressed 0.8 mm into the body, costs "), "{text}");
+    // What is held between planes of the lattice is told, of that region alone.
+    let scene = fs::read_to_string(folder.path().join("far.toml")).unwrap().replace("[40, 40, 20]", "[40, 40, 21]");
+    let path = folder.path().join("between.toml");
+    fs::write(&path, scene + "[[prescribed]]\nregion = \"z_max\"\ndisplacement_m = [0, 0, 0]\n").unwrap();
+    let text = succeeds(&["check", path.to_str().unwrap()]);
+    let told = "what is held as \"z_max\" is flat and lies 1 mm off the planes of the particles' lattice";
+    assert!(text.contains(told) && !text.contains("what is held as \"fixed xyz\""), "{text}");
 }
 
 /// Meshes as Gmsh writes them, with lines, points, partitions and parameters, and one with a hexahedron, are no reason for a warning;

@@ -122,7 +122,8 @@ mod tests {
         }
         assert!(seen > 50 && of_both > 1, "{seen} {of_both}");
         // Sets that may move hold what lies within one of them alone.
-        let moved: Vec<PrescribedSpec> = sets.into_iter().map(|set| PrescribedSpec { is_fixed: false, ..set }).collect();
+        let moved: Vec<PrescribedSpec> =
+            sets.into_iter().map(|set| PrescribedSpec { is_fixed: false, ..set }).collect();
         let fewer: usize = with_edges(&mesh, &surface, &composite, &moved).iter().map(|set| set.nodes.len()).sum();
         assert!(fewer < extended.iter().map(|set| set.nodes.len()).sum::<usize>());
     }

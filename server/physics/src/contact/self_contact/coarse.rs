@@ -19,12 +19,21 @@ const DEVIATION: f64 = 0.1;
 const TURNED: f64 = 0.6;
 /// Height over longest edge below which a triangle is a sliver.
 const SLIVER: f64 = 0.25;
+/// How often at most short edges are offered: what may not be collapsed may be once its neighbours were.
+const PASSES: usize = 4;
 
 /// Returns fewer triangles of the same vertices, at positions (m), with edges of about `edge_m`.
 pub(crate) fn coarse_walls(positions_m: &[DVec3], triangles: &[[u32; 3]], edge_m: f64) -> Vec<[u32; 3]> {
     let mut walls = Coarsening::new(positions_m, triangles, edge_m);
-    while let Some(Reverse((_, from, to))) = walls.short.pop() {
-        walls.collapse(from, to);
+    for _ in 0..PASSES {
+        walls.offer_all();
+        let mut is_done = true;
+        while let Some(Reverse((_, from, to))) = walls.short.pop() {
+            is_done &= !walls.collapse(from, to);
+        }
+        if is_done {
+            break;
+        }
     }
     walls.triangles.into_iter().flatten().collect()
 }
@@ -51,20 +60,25 @@ impl<'a> Coarsening<'a> {
                 around[corner as usize].push(triangle);
             }
         }
-        let mut made = Self {
+        Self {
             positions_m,
             edge_m,
             triangles: triangles.iter().copied().map(Some).collect(),
             around,
             gone: vec![Vec::new(); triangles.len()],
             short: BinaryHeap::new(),
-        };
-        for &[a, b, c] in triangles {
+        }
+    }
+
+    /// Offers all short edges.
+    fn offer_all(&mut self) {
+        for triangle in 0..self.triangles.len() {
+            let Some([a, b, c]) = self.triangles[triangle] else { continue };
+            // On a closed surface the neighbour beyond an edge passes it the other way round.
             for (from, to) in [(a, b), (b, c), (c, a)] {
-                made.offer(from, to);
+                self.offer(from, to);
             }
         }
-        made
     }
 
     fn at(&self, vertex: u32) -> DVec3 {
@@ -93,27 +107,29 @@ impl<'a> Coarsening<'a> {
         all
     }
 
-    /// Collapses `from` to its neighbour `to`, if they are neighbours and it may be.
-    fn collapse(&mut self, from: u32, to: u32) {
+    /// Collapses `from` to its neighbour `to`, if they are neighbours and it may be. Returns whether it was.
+    fn collapse(&mut self, from: u32, to: u32) -> bool {
         let (fan, neighbours): (Vec<_>, _) = (self.fan(from).collect(), self.neighbours(from));
         // Around a vertex inside a surface there are as many triangles as neighbours.
         if neighbours.len() != fan.len() || neighbours.binary_search(&to).is_err() {
-            return;
+            return false;
         }
         let of_other = self.neighbours(to);
         let has = |corners: &[u32; 3]| corners.contains(&to);
         let in_common = neighbours.iter().filter(|n| of_other.binary_search(n).is_ok()).count();
         if in_common != 2 || fan.iter().filter(|(_, corners)| has(corners)).count() != 2 {
-            return;
+            return false;
         }
         let moved = |corners: [u32; 3]| corners.map(|corner| if corner == from { to } else { corner });
         let left = || fan.iter().filter(|(_, corners)| !has(corners));
         let worst = fan.iter().map(|(_, corners)| self.roundness(*corners)).fold(f64::INFINITY, f64::min);
         if !left().all(|(_, corners)| self.may_become(*corners, moved(*corners), worst.min(SLIVER))) {
-            return;
+            return false;
         }
         let becomes: Vec<(u32, [u32; 3])> = left().map(|(triangle, corners)| (*triangle, moved(*corners))).collect();
-        let Some(nearest) = self.nearest(fan.iter().map(|(triangle, _)| *triangle), from, &becomes) else { return };
+        let Some(nearest) = self.nearest(fan.iter().map(|(triangle, _)| *triangle), from, &becomes) else {
+            return false;
+        };
         for (triangle, corners) in &fan {
             self.gone[*triangle as usize].clear();
             self.triangles[*triangle as usize] = None;
@@ -126,10 +142,11 @@ impl<'a> Coarsening<'a> {
             corners.iter().for_each(|corner| self.around[*corner as usize].push(triangle));
         }
         nearest.into_iter().for_each(|(vertex, triangle)| self.gone[triangle as usize].push(vertex));
-        for neighbour in self.neighbours(to) {
+        for neighbour in neighbours.into_iter().filter(|n| *n != to && of_other.binary_search(n).is_err()) {
             self.offer(to, neighbour);
             self.offer(neighbour, to);
         }
+        true
     }
 
     /// Returns the height of a triangle over its longest edge.
@@ -267,7 +284,8 @@ mod tests {
     fn a_skin_with_an_end_keeps_it_and_one_as_coarse_as_wanted_is_as_it_was() {
         let (points, triangles) = sphere(4);
         let is_end = |vertex: u32| points[vertex as usize].z < 0.0;
-        let open: Vec<[u32; 3]> = triangles.iter().copied().filter(|corners| !corners.iter().all(|c| is_end(*c))).collect();
+        let open: Vec<[u32; 3]> =
+            triangles.iter().copied().filter(|corners| !corners.iter().all(|c| is_end(*c))).collect();
         let ends = |triangles: &[[u32; 3]]| -> Vec<(u32, u32)> {
             let passes = passes(triangles);
             passes.keys().copied().filter(|&(a, b)| !passes.contains_key(&(b, a))).collect()
