@@ -74,7 +74,7 @@ fn the_spacing_follows_the_tool_and_is_all_that_changes() {
         .find(|line| line.trim_start().starts_with("24 "))
         .unwrap_or_else(|| panic!("{}", written.shown));
     let off: f64 = row.split_whitespace().rev().nth(1).unwrap().parse().unwrap();
-    assert!(off > 0.0 && off < 50.0, "{row}");
+    assert!(off > 1.0 && off < 5.0, "{row}");
     // What was chosen is served as it is.
     let check = Command::new(env!("CARGO_BIN_EXE_palpated")).arg("check").arg(&path).output().unwrap();
     assert!(check.status.success(), "{}", String::from_utf8_lossy(&check.stderr));

@@ -174,6 +174,10 @@ fn print_walls(model: &Model) {
         return;
     }
     say(format_args!("walls      press each other where they meet"));
+    if model.wall_triangles() < model.surface().triangles.len() {
+        let triangles = counted(model.wall_triangles(), "triangle");
+        say(format_args!("           they are made of {triangles}, whose edges are about as long as particles are apart"));
+    }
     let left_out = model.vertices_against_themselves();
     if left_out > 0 {
         say(format_args!("           {left_out} of its vertices do not: the body lies against itself there at rest"));

@@ -128,6 +128,12 @@ impl Model {
         self.contact().walls().is_some()
     }
 
+    /// Returns the number of triangles that walls are made of, which are fewer than the surface's where it is cut more finely than what moves
+    /// it; 0 where walls pass through each other.
+    pub fn wall_triangles(&self) -> usize {
+        self.contact().walls().map_or(0, |walls| walls.triangles().len())
+    }
+
     /// Returns the number of the surface's vertices that press no walls, because the body lies against itself there at
     /// rest.
     pub fn vertices_against_themselves(&self) -> usize {

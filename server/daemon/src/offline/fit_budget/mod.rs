@@ -28,7 +28,7 @@ const PART_OF_TICK: f64 = 0.5;
 /// Spacing of particles over the radius of the tool that touches them.
 const SPACING: f64 = 0.5;
 /// Part of the body's volume in whole cells below which the spacing is too coarse for the body; what it is lowered by, and how often.
-const FEW_WHOLE: f64 = 0.35;
+const ENOUGH_WHOLE: f64 = 0.35;
 /// Most particles of a lattice whose spacing the scene does not say.
 const MOST_PARTICLES: u32 = 500_000;
 const FINER: f64 = 0.8;
@@ -206,7 +206,7 @@ impl Search<'_> {
             let numbers = Numbers { spacing_m, most_active, target_tets };
             let trial = self.trial(&numbers, &self.text.with_chosen(&numbers))?;
             let whole = trial.part_in_whole_cells();
-            if said_m.is_some() || whole >= FEW_WHOLE || finer == MOST_FINER {
+            if said_m.is_some() || whole >= ENOUGH_WHOLE || finer == MOST_FINER {
                 return Ok((spacing_m, trial));
             }
             finer += 1;

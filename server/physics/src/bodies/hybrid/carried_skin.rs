@@ -219,16 +219,19 @@ impl HybridBody {
     /// Returns the position (m) of a vertex of the skin, at positions `x` (m) of coarse nodes and then of the active
     /// particles `active`.
     pub fn vertex_m(&self, vertex: u32, active: &[u32], x: &[DVec3]) -> DVec3 {
-        let (of_nodes, of_particles) = x.split_at(self.node_count());
-        let moved = |particle: u32| {
-            let x = match active.binary_search(&particle) {
-                Ok(number) => of_particles[number],
-                Err(_) => self.partition.anchor(particle).of(of_nodes),
-            };
-            x - self.partition.particle_m(particle)
-        };
         let rest_m = self.skin_rest_m()[vertex as usize];
-        rest_m + self.carriers_of_vertex(vertex).iter().map(|&(p, w)| moved(p) * w).sum::<DVec3>()
+        let carriers = self.carriers_of_vertex(vertex).iter();
+        rest_m + carriers.map(|&(particle, w)| self.particle_moved_m(particle, active, x) * w).sum::<DVec3>()
+    }
+
+    /// Returns the displacement (m) of a particle, active or not, at such positions.
+    pub(super) fn particle_moved_m(&self, particle: u32, active: &[u32], x: &[DVec3]) -> DVec3 {
+        let (of_nodes, of_particles) = x.split_at(self.node_count());
+        let x = match active.binary_search(&particle) {
+            Ok(number) => of_particles[number],
+            Err(_) => self.partition.anchor(particle).of(of_nodes),
+        };
+        x - self.partition.particle_m(particle)
     }
 }
 

@@ -94,17 +94,9 @@ impl BodyKind for HybridBody {
 
     /// As the particles around the point have gone.
     fn displacement_m(&self, own: &HybridState, state: &MechanicalState, point: &MaterialPoint) -> DVec3 {
-        let partition = self.partition();
-        let (of_nodes, of_particles) = state.x.split_at(self.node_count());
-        let moved = |particle: u32| {
-            let x = match own.ids().binary_search(&particle) {
-                Ok(number) => of_particles[number],
-                Err(_) => partition.anchor(particle).of(of_nodes),
-            };
-            x - partition.particle_m(particle)
-        };
-        let at = TrilinearPoint::new(partition, point.rest_m);
-        at.particles.into_iter().zip(at.weights).map(|(particle, w)| moved(particle) * w).sum()
+        let at = TrilinearPoint::new(self.partition(), point.rest_m);
+        let moved_m = |particle: u32| self.particle_moved_m(particle, own.ids(), &state.x);
+        at.particles.into_iter().zip(at.weights).map(|(particle, w)| moved_m(particle) * w).sum()
     }
 
     /// Of the coarse level, which moves alone while all particles sleep, with its own lumped masses.
