@@ -86,8 +86,10 @@ fn a_boundary_moved_uniformly_solves_to_a_uniform_interior() {
         let f = random_gradient(&mut Random(5));
         let mesh = body.body.solid().unwrap().mesh.clone();
         let held: Vec<u32> = palpate_physics::Surface::of(&mesh).unwrap().nodes;
-        body.prescribed =
-            held.iter().map(|&n| PrescribedSpec { name: format!("{n}"), nodes: vec![n], axes: [true; 3], is_fixed: false }).collect();
+        body.prescribed = held
+            .iter()
+            .map(|&n| PrescribedSpec { name: format!("{n}"), nodes: vec![n], axes: [true; 3], is_fixed: false })
+            .collect();
         let moved: Vec<DVec3> = held
             .iter()
             .map(|&n| {

@@ -167,7 +167,12 @@ fn growth(fraction: f64, ticks: u32) -> f64 {
             }
             .into(),
         ),
-        prescribed: vec![PrescribedSpec { name: "base".into(), nodes: (0..20).collect(), axes: [true; 3], is_fixed: false }],
+        prescribed: vec![PrescribedSpec {
+            name: "base".into(),
+            nodes: (0..20).collect(),
+            axes: [true; 3],
+            is_fixed: false,
+        }],
         loads: vec![],
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![],

@@ -176,7 +176,9 @@ fn print_walls(model: &Model) {
     say(format_args!("walls      press each other where they meet"));
     if model.wall_triangles() < model.surface().triangles.len() {
         let triangles = counted(model.wall_triangles(), "triangle");
-        say(format_args!("           they are made of {triangles}, whose edges are about as long as particles are apart"));
+        say(format_args!(
+            "           they are made of {triangles}, whose edges are about as long as particles are apart"
+        ));
     }
     let left_out = model.vertices_against_themselves();
     if left_out > 0 {

@@ -77,7 +77,12 @@ pub fn block_scene(name: &str, cells: u32) -> Scene {
                 }
                 .into(),
             ),
-            prescribed: vec![PrescribedSpec { name: "table".into(), nodes: bottom.clone(), axes: [true; 3], is_fixed: false }],
+            prescribed: vec![PrescribedSpec {
+                name: "table".into(),
+                nodes: bottom.clone(),
+                axes: [true; 3],
+                is_fixed: false,
+            }],
             loads: Vec::new(),
             gravity_m_per_s2: DVec3::ZERO,
             tools: vec![tool("finger", above()), tool("probe", above() + DVec3::X * 0.2)],

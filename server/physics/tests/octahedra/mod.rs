@@ -64,7 +64,12 @@ pub fn body_spec(outer_m: f64, layer: Option<LayerSpec>, parameters: SeedParamet
             layer,
             parameters,
         }),
-        prescribed: vec![PrescribedSpec { name: "inner".into(), nodes: vec![1, 2, 3, 5], axes: [true; 3], is_fixed: false }],
+        prescribed: vec![PrescribedSpec {
+            name: "inner".into(),
+            nodes: vec![1, 2, 3, 5],
+            axes: [true; 3],
+            is_fixed: false,
+        }],
         loads: Vec::new(),
         gravity_m_per_s2: DVec3::ZERO,
         tools: vec![ToolSpec {

@@ -153,7 +153,12 @@ fn block(width_m: f64, from_z_m: f64, to_z_m: f64, cells: u32) -> Result<TetBody
     Ok(TetBody {
         surface: Surface::of(&mesh).into_diagnostic()?,
         mesh,
-        prescribed: vec![PrescribedSpec { name: "floor".into(), nodes: side("z_min")?.nodes(), axes: [true; 3], is_fixed: false }],
+        prescribed: vec![PrescribedSpec {
+            name: "floor".into(),
+            nodes: side("z_min")?.nodes(),
+            axes: [true; 3],
+            is_fixed: false,
+        }],
         touched: side("z_max")?.triangles.clone(),
         touch_m: DVec3::Z * to_z_m,
         normal: DVec3::Z,

@@ -153,7 +153,8 @@ mod tests {
         let mesh = TetMesh::new(positions, lower.tets().iter().copied().chain(shifted).collect()).unwrap();
         let mut composite = Composite::new(&mesh);
         let nodes = composite.positions_m().iter().enumerate().filter(|(_, p)| p.z == 0.0).map(|(node, _)| node as u32);
-        let mut prescribed = [PrescribedSpec { name: "top".into(), nodes: nodes.collect(), axes: [true; 3], is_fixed: false }];
+        let mut prescribed =
+            [PrescribedSpec { name: "top".into(), nodes: nodes.collect(), axes: [true; 3], is_fixed: false }];
         let sites = Sites::covering((DVec3::Z * -0.02, DVec3::new(0.04, 0.04, 0.025)), 4e-3, DVec3::Z * -2e-3);
         let surface = Surface::of(&mesh).unwrap();
         let held = hold(&mesh, &surface, &sites, 0..sites.site_count(), &mut composite, &mut prescribed);

@@ -51,7 +51,8 @@ impl BodyKind for HybridBody {
 
     fn fingerprint_into(&self, hash: &mut Fnv) {
         // A float prints as the shortest text that reads back to its bits. Writing to the hash cannot fail.
-        let _ = write!(hash, "hybrid {:?}", (self.coarse(), self.materials(), &self.densities_kg_per_m3, self.particles()));
+        let _ =
+            write!(hash, "hybrid {:?}", (self.coarse(), self.materials(), &self.densities_kg_per_m3, self.particles()));
     }
 
     /// The coarse level's.

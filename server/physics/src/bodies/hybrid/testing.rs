@@ -75,7 +75,12 @@ pub(crate) fn hybrid_ball_of(materials: &[Material; 2], spacing_m: f64, fine_dep
     let nodes = |of: &dyn Fn(DVec3) -> bool| -> Vec<u32> {
         (0..coarse.positions_m().len() as u32).filter(|&n| of(coarse.positions_m()[n as usize])).collect()
     };
-    let low = PrescribedSpec { name: "low".into(), nodes: nodes(&|p| p.z < -9e-3), axes: [true, false, true], is_fixed: false };
+    let low = PrescribedSpec {
+        name: "low".into(),
+        nodes: nodes(&|p| p.z < -9e-3),
+        axes: [true, false, true],
+        is_fixed: false,
+    };
     let far = PrescribedSpec { name: "far".into(), nodes: nodes(&|p| p.y > 9e-3), axes: [true; 3], is_fixed: false };
     let surface = Surface::of(&coarse).unwrap();
     let region = |(material, density_kg_per_m3)| Region { name: "half".into(), material, density_kg_per_m3 };
