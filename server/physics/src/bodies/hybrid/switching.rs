@@ -264,7 +264,7 @@ impl HybridScratch {
         state.force_is_current = false;
         own.switched_j = own.switched_j.max(elastic_j);
         if own.may_use_transition_force() {
-            transition.demand(body, next.mass_matrix_mut(), &query.left, own.ids(), &query.transferred_n);
+            transition.demand(body, next.mass_matrix_mut(), &query.left, own.ids(), &query.transferred_n, state.tick);
         }
         staged.swap(patch);
         body.amplification() * farthest_m

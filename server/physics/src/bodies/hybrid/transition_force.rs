@@ -37,6 +37,8 @@ pub(crate) struct TransitionForce {
     /// Forces (N) with which accelerations do not jump; empty unless the next evaluation has to find the transition
     /// force.
     due_n: Vec<DVec3>,
+    /// The tick in which they are due: another state that these buffers are used for has none.
+    due_at_tick: u64,
     /// A buffer of accelerations (m/s²).
     accelerations: Vec<DVec3>,
     /// The transition force (N) before a tick's first kick, as it is and as it was taken.
@@ -46,7 +48,7 @@ pub(crate) struct TransitionForce {
 impl TransitionForce {
     pub(super) fn with_room(entries: usize) -> Self {
         let list = || Vec::with_capacity(entries);
-        Self { before: list(), due_n: list(), accelerations: list(), at_start_n: [list(), list()] }
+        Self { before: list(), due_n: list(), due_at_tick: 0, accelerations: list(), at_start_n: [list(), list()] }
     }
 
     /// Keeps the transition force before a tick's first kick: a tick that is repeated has it again, though it ended within the tick.
@@ -91,7 +93,7 @@ impl TransitionForce {
     }
 
     /// Finds, after a switch from the active particles `before` to those `after`, what the forces (N) have to be at the
-    /// next evaluation. `transferred_n` comes from [`Self::transfer`].
+    /// next evaluation, which is in this tick. `transferred_n` comes from [`Self::transfer`].
     pub(super) fn demand(
         &mut self,
         body: &HybridBody,
@@ -99,7 +101,9 @@ impl TransitionForce {
         before: &[u32],
         after: &[u32],
         transferred_n: &[DVec3],
+        tick: u64,
     ) {
+        self.due_at_tick = tick;
         self.due_n.clear();
         if self.before.is_empty() {
             return;
@@ -121,10 +125,10 @@ impl TransitionForce {
 
     /// Takes the transition force away from the total forces at an evaluation; computes it first after a switch.
     pub(crate) fn apply(&mut self, body: &HybridBody, own: &mut HybridState, state: &mut MechanicalState) {
-        let MechanicalState { x, force_n, .. } = state;
+        let MechanicalState { x, force_n, tick: at_tick, .. } = state;
         let may_be = own.may_use_transition_force();
         let HybridState { transition_force_n, transition_taken_n, .. } = own;
-        if self.due_n.len() == force_n.len() {
+        if self.due_n.len() == force_n.len() && self.due_at_tick == *at_tick {
             transition_force_n.clear();
             transition_force_n.extend(force_n.iter().zip(&self.due_n).map(|(force, due)| *force - *due));
             for (force, free) in transition_force_n.iter_mut().zip(&body.free) {
