@@ -324,7 +324,11 @@ fn a_hybrid_body_is_checked_with_particles_awake() {
     // What is held between planes of the lattice is told, of that region alone.
     let scene = fs::read_to_string(folder.path().join("far.toml")).unwrap().replace("[40, 40, 20]", "[40, 40, 21]");
     let path = folder.path().join("between.toml");
-    fs::write(&path, scene + "[[prescribed]]\nregion = \"z_max\"\ndisplacement_m = [0, 0, 0]\n").unwrap();
+    fs::write(
+        &path,
+        scene + "[[prescribed]]\nregion = \"z_max\"\ndisplacement_m = [0, 0, 0]\namplitude = { constant = 1 }\n",
+    )
+    .unwrap();
     let text = succeeds(&["check", path.to_str().unwrap()]);
     let told = "what is held as \"z_max\" is flat and lies 1 mm off the planes of the particles' lattice";
     assert!(text.contains(told) && !text.contains("what is held as \"fixed xyz\""), "{text}");

@@ -56,7 +56,8 @@ fn told(what: &str, mut times: Vec<Duration>) {
 
 fn bridges_are_killed(what: &str, arm: arms::Emulated) {
     let _alone = alone();
-    let daemon = Daemon::start(&["--arm", "none", "ventricle"]);
+    let folder = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(&["--arm", "none", &lab::light_ventricle(folder.path())]);
     let lab = Lab::new(arm, &daemon.url);
     let session = daemon.status()["session_id"].clone();
     let (mut random, mut tick, mut times) = (Random(1), 0, Vec::new());
@@ -91,7 +92,9 @@ fn a_killed_bridge_leaves_no_force_on_a_hapticmaster() {
 #[test]
 fn a_killed_daemon_leaves_no_force_and_the_next_one_is_found() {
     let _alone = alone();
-    let mut daemon = Daemon::start(&["--arm", "none", "ventricle"]);
+    let folder = tempfile::tempdir().unwrap();
+    let scene = lab::light_ventricle(folder.path());
+    let mut daemon = Daemon::start(&["--arm", "none", &scene]);
     let address = daemon.url.trim_start_matches("http://").to_owned();
     let lab = Lab::new(arms::woodenhaptics(&hand()), &daemon.url);
     let mut bridge = lab.bridge();
@@ -102,7 +105,7 @@ fn a_killed_daemon_leaves_no_force_and_the_next_one_is_found() {
         daemon.program.kill();
         let took = killed.elapsed();
         times.push(took + lab.wait_for_end());
-        daemon = Daemon::at(&address, "palpated", &["serve", "--arm", "none", "ventricle"]);
+        daemon = Daemon::at(&address, "palpated", &["serve", "--arm", "none", &scene]);
     }
     told("daemon", times);
     wait_pressed(&lab, (&mut bridge, &daemon), &mut random);

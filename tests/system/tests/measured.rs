@@ -26,7 +26,7 @@ fn measure(url: &str, picture: &Path) -> Output {
 #[test]
 fn a_link_is_measured_and_one_that_is_too_slow_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let daemon = Daemon::start(&["--arm", "none", "ventricle"]);
+    let daemon = Daemon::start(&["--arm", "none", &lab::light_ventricle(folder.path())]);
     let network = Network::to(&daemon.url, 4);
     let good = measure(&network.url(), &folder.path().join("good.svg"));
     let said = String::from_utf8_lossy(&good.stdout);

@@ -157,7 +157,8 @@ fn the_hand_gets_no_energy_through_any_network() {
 /// A cable that is pulled while the body is pressed, and put in again.
 #[test]
 fn a_cut_takes_the_force_away_and_the_arm_comes_back() {
-    let daemon = Daemon::start(&["--arm", "none", "ventricle"]);
+    let folder = tempfile::tempdir().unwrap();
+    let daemon = Daemon::start(&["--arm", "none", &lab::light_ventricle(folder.path())]);
     let network = Network::to(&daemon.url, 2);
     // It stays pressed: the force ends because it is taken away.
     let keys = vec![(0.0, 0.050), (0.1, 0.050), (0.4, 0.030), (2.4, 0.030), (2.7, 0.050)];
