@@ -54,13 +54,15 @@ fn a_tick_that_is_repeated_is_as_if_it_had_been_taken_in_its_substeps_at_once() 
     }
 }
 
+/// Returns a vertex of the upper face.
+fn top(rig: &Rig) -> u32 {
+    let rest_m = rig.model.surface_rest_positions_m();
+    (0..rest_m.len() as u32).max_by(|a, b| rest_m[*a as usize].z.total_cmp(&rest_m[*b as usize].z)).unwrap()
+}
+
 /// With prestrain and a transition force that what is not finite would have spoilt.
 #[test]
 fn what_is_quarantined_is_finite_and_can_be_saved() {
-    let top = |rig: &Rig| {
-        let rest_m = rig.model.surface_rest_positions_m();
-        (0..rest_m.len() as u32).max_by(|a, b| rest_m[*a as usize].z.total_cmp(&rest_m[*b as usize].z)).unwrap()
-    };
     for ticks_ago in [0, 1, 4] {
         for force_n in [DVec3::Z * 1e300, DVec3::NEG_X * f64::MAX] {
             let mut rig = switched(ticks_ago);
@@ -99,4 +101,35 @@ fn buffers_of_another_state_leave_nothing_behind() {
     }
     let hash = |rig: &Rig| snapshot::state_hash(&rig.state);
     assert_eq!([hash(&other), hash(&fresh)], [hash(&own); 2]);
+}
+
+/// What was not finite in a quarantined body stays in no buffer: the same presses with buffers of their own have the same bits, with more
+/// particles awake and with fewer.
+#[test]
+fn a_body_that_was_broken_and_reset_is_as_good_as_new() {
+    let press = |rig: &mut Rig, x_m: f64, radius_m: f64| {
+        let awake = near(rig, DVec3::new(x_m, 0.0, 0.0), radius_m);
+        wake_only(&rig.model, &mut rig.state, &mut rig.scratch, awake);
+        for tick in 0..20 {
+            let report = rig.tick_at(DVec3::Z * (6e-3 - 1e-4 * f64::from(tick)));
+            assert!(report.quarantined.is_none(), "{x_m} {radius_m} {tick}");
+        }
+    };
+    for broken_radius_m in [5e-3, 8e-3, 11e-3] {
+        let mut rig = Rig::new(pressed_block(Precision::Double, None));
+        press(&mut rig, 0.0, broken_radius_m);
+        let mut drive = rig.still();
+        drive.point_forces.push(PointForce { node: top(&rig), force_n: DVec3::Z * 1e300 });
+        assert!(rig.tick(&drive).quarantined.is_some());
+        rig.state.reset(&rig.model);
+        let mut fresh = Rig::new(pressed_block(Precision::Double, None));
+        for radius_m in [11e-3, 5e-3, 6e-3, 7e-3, 8e-3, 9e-3, 10e-3, 4e-3] {
+            for x_m in [0.0, 2e-3, -3e-3] {
+                press(&mut rig, x_m, radius_m);
+                press(&mut fresh, x_m, radius_m);
+                let same = snapshot::state_hash(&rig.state) == snapshot::state_hash(&fresh.state);
+                assert!(same, "{broken_radius_m} {x_m} {radius_m}");
+            }
+        }
+    }
 }

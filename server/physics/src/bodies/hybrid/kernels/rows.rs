@@ -118,6 +118,10 @@ impl<T: Scalar> Rows<T> {
         for sums in arrays.left.iter_mut().chain(&mut arrays.right) {
             sums[..1 + points + LANES].fill(T::of(0.0));
         }
+        // Lanes beyond the last point count 0 times; what is not finite there, of more points before, would spread all the same.
+        for values in arrays.displacements.iter_mut().chain(&mut arrays.velocities).filter(|list| !list.is_empty()) {
+            values[1 + points..1 + points + LANES].fill(T::of(0.0));
+        }
         let mut found = Found::default();
         for same in rows.chunk_by(|a, b| a.material == b.material) {
             let material = &materials[same[0].material as usize];
