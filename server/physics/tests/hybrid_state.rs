@@ -4,6 +4,7 @@ mod rig;
 use glam::DVec3;
 use palpate_physics::{
     PointForce, Precision, Scratch,
+    material::Viscosity,
     snapshot::{self, SnapshotError},
     world::wake_only,
 };
@@ -115,14 +116,20 @@ fn a_body_that_was_broken_and_reset_is_as_good_as_new() {
             assert!(report.quarantined.is_none(), "{x_m} {radius_m} {tick}");
         }
     };
-    for broken_radius_m in [5e-3, 8e-3, 11e-3] {
-        let mut rig = Rig::new(pressed_block(Precision::Double, None));
+    let block = |precision: Precision, viscosity_pa_s: f64| {
+        let mut spec = pressed_block(precision, None);
+        solid_mut(&mut spec).regions[0].material.viscosity = Viscosity::new(viscosity_pa_s, 0.0).unwrap();
+        Rig::new(spec)
+    };
+    for (broken_radius_m, precision, viscosity_pa_s) in
+        [(5e-3, Precision::Double, 0.0), (8e-3, Precision::Single, 0.3), (11e-3, Precision::Double, 0.3)]
+    {
+        let (mut rig, mut fresh) = (block(precision, viscosity_pa_s), block(precision, viscosity_pa_s));
         press(&mut rig, 0.0, broken_radius_m);
         let mut drive = rig.still();
         drive.point_forces.push(PointForce { node: top(&rig), force_n: DVec3::Z * 1e300 });
         assert!(rig.tick(&drive).quarantined.is_some());
         rig.state.reset(&rig.model);
-        let mut fresh = Rig::new(pressed_block(Precision::Double, None));
         for radius_m in [11e-3, 5e-3, 6e-3, 7e-3, 8e-3, 9e-3, 10e-3, 4e-3] {
             for x_m in [0.0, 2e-3, -3e-3] {
                 press(&mut rig, x_m, radius_m);

@@ -106,7 +106,8 @@ fn pressed(daemon: &Daemon, arm: &Emulated, period_s: f64, recording: &Path) -> 
     (summary.latched == 0).then(|| Curve::of(recording, period_s))
 }
 
-/// A machine that runs tests stands still for 17 ms now and then, and then the force is gone for 0.7 s: so often is a press tried.
+/// A machine that runs tests stands still now and then: answers come late, and where none comes in time the force is gone for 0.7 s. So often is a
+/// press tried.
 const TRIES: usize = 11;
 /// Presses among which the simulated arm's force is to come twice.
 const PRESSES: usize = 22;

@@ -16,9 +16,9 @@ use std::process::ExitCode;
 
 /// Flags of `palpated check`.
 #[derive(Debug, Clone, clap::Args)]
-#[command(
-    after_help = "Exit code: 0 when the scene loads and the body survives up to half a second of it, and a hybrid body then its first tool in a light touch (1 with --strict if it has warnings), else 1."
-)]
+#[command(after_help = "\
+Exit code: 0 when the scene loads and the body survives up to half a second of it, and a hybrid body then its first \
+tool in a light touch (1 with --strict if it has warnings), else 1.")]
 pub struct CheckArgs {
     /// Scene file or name of a built-in scene
     #[arg(required_unless_present = "list")]

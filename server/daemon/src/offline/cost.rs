@@ -59,8 +59,17 @@ fn of_ticks(scene: &Scene, model: &Model) -> miette::Result<Cost> {
     if ticks >= ENOUGH_TICKS && served(model).wakes_particles_for_tools() {
         return Ok(Cost { all, awake: Some(AwakeCost { tick_wall_us, ticks, most, touched_m: None }), inverted });
     }
-    let Some((awake, inverted_there)) = touched(scene, model)? else { return Ok(Cost { all, awake: None, inverted }) };
-    Ok(Cost { all, awake, inverted: inverted.or(inverted_there) })
+    let touched = touched(scene, model)?;
+    Ok(Cost { all, awake: touched.awake, inverted: inverted.or(touched.inverted) })
+}
+
+/// What a light touch of the first tool shows; nothing where no tool can touch the body.
+#[derive(Default)]
+struct Touched {
+    /// `None` where it wakes no particles.
+    awake: Option<AwakeCost>,
+    /// Told where elements turned inside out.
+    inverted: Option<String>,
 }
 
 fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<TimeNumbers> {
@@ -74,10 +83,9 @@ fn run_for(run: &mut Run<'_>, scene: &Scene, model: &Model) -> miette::Result<Ti
     }
 }
 
-/// Ticks of the body with its first tool in a light touch, if it wakes particles there, and what turned inside out; `None` where no tool can
-/// touch it.
-fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<(Option<AwakeCost>, Option<String>)>> {
-    let Some(touch) = served(model).first_touch(scene) else { return Ok(None) };
+/// Ticks of the body with its first tool in a light touch.
+fn touched(scene: &Scene, model: &Model) -> miette::Result<Touched> {
+    let Some(touch) = served(model).first_touch(scene) else { return Ok(Touched::default()) };
     let mut run = Run::new(scene, model)?;
     let depth_m = run.touch(&touch);
     let started = Instant::now();
@@ -88,5 +96,5 @@ fn touched(scene: &Scene, model: &Model) -> miette::Result<Option<(Option<AwakeC
     }
     let (tick_wall_us, ticks, most) = run.cost_awake();
     let awake = (ticks > 0).then_some(AwakeCost { tick_wall_us, ticks, most, touched_m: Some(depth_m) });
-    Ok(Some((awake, run.inverted())))
+    Ok(Touched { awake, inverted: run.inverted() })
 }

@@ -37,15 +37,7 @@ impl Surface {
             }
         }
         let boundary: Vec<[u32; 3]> = faces().filter(|&face| owners[&sorted(face)].2 == 1).collect();
-        let mut nodes: Vec<u32> = boundary.iter().flatten().copied().collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        let mut vertex_of_node = vec![u32::MAX; mesh.positions_m().len()];
-        for (vertex, &node) in nodes.iter().enumerate() {
-            vertex_of_node[node as usize] = vertex as u32;
-        }
-        let triangles = boundary.iter().map(|face| face.map(|node| vertex_of_node[node as usize])).collect();
-        Ok(Self { nodes, triangles, vertex_of_node })
+        Ok(Self::of_triangles(mesh.positions_m().len(), &boundary))
     }
 
     /// A surface by itself: every vertex is its own node.
@@ -54,8 +46,8 @@ impl Surface {
         Self { vertex_of_node: nodes.clone(), nodes, triangles }
     }
 
-    /// A surface of some of so many nodes: those of the triangles, which are given by their nodes.
-    pub(crate) fn of_some(nodes: usize, triangles: &[[u32; 3]]) -> Self {
+    /// The surface of triangles that are given by their nodes, among so many.
+    pub(crate) fn of_triangles(nodes: usize, triangles: &[[u32; 3]]) -> Self {
         let mut vertex_of_node = vec![u32::MAX; nodes];
         triangles.iter().flatten().for_each(|&node| vertex_of_node[node as usize] = 0);
         let used: Vec<u32> = (0..nodes as u32).filter(|&node| vertex_of_node[node as usize] == 0).collect();

@@ -17,9 +17,7 @@
 //! modes of the fine level with `ω k h` near `nπ` resonate with what they feel of the coarse one. `docs/adr/hybrid.md`
 //! has what was measured.
 use super::kernels::Found;
-use super::{
-    body::HybridBody, prestrain::Progress, scratch::HybridScratch, state::HybridState, transition_force::without_torque,
-};
+use super::{body::HybridBody, scratch::HybridScratch, state::HybridState, transition_force::without_torque};
 use crate::hash::Chain;
 use crate::{
     lanes::vector_operations::Answer,
@@ -182,21 +180,12 @@ pub(super) struct LongStepHistory {
     /// Number of the tick's long steps that have begun.
     begun: u32,
     at_start: LongSteps,
-    /// The rest of the state of which a tick that is repeated, or refused, has to begin as it did.
-    prestrain_at_start: Progress,
-    given_at_start_j: f64,
 }
 
 impl LongStepHistory {
     pub(super) fn with_room(nodes: usize, entries: usize) -> Self {
         let instant = || Instant::with_room(nodes, entries);
-        Self {
-            recent: [instant(), instant()],
-            begun: 0,
-            at_start: LongSteps::with_room(nodes, entries),
-            prestrain_at_start: Progress::default(),
-            given_at_start_j: 0.0,
-        }
+        Self { recent: [instant(), instant()], begun: 0, at_start: LongSteps::with_room(nodes, entries) }
     }
 }
 
@@ -210,18 +199,6 @@ impl HybridScratch {
         if !state.force_is_current {
             own.long_steps.before.forget();
         }
-    }
-
-    /// Keeps what decays within a tick.
-    pub(super) fn keep_decay(&mut self, own: &HybridState) {
-        self.long_steps.prestrain_at_start = own.prestrain.progress();
-        self.long_steps.given_at_start_j = own.given_j;
-    }
-
-    /// Restores what [`Self::keep_decay`] kept.
-    pub(super) fn put_decay_back(&self, own: &mut HybridState) {
-        own.prestrain.go_back(self.long_steps.prestrain_at_start);
-        own.given_j = self.long_steps.given_at_start_j;
     }
 
     /// Restores what [`Self::keep_long_steps`] kept, so that the tick can be taken again in more long steps.

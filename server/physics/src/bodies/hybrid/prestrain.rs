@@ -9,9 +9,10 @@
 //! ```
 //! There is one `A` for its shape and one for its volume, whose strain is the tet's (`residual_element`), and the
 //! hourglass stiffness is `κ (1 − a)`, with `a` from 1 to 0. A part that loses volume, or gets some back, has an `A` of
-//! its own: its effective gradient is at first the mean, by volume, of those of what it is made of. Where
-//! these are strained little and turn little against each other its energy is no more than theirs (Jensen); no objective
-//! energy is convex, so where they turn much it may be more, and what it changes by is booked. Changes of the rest state are objective: they do not change momentum.
+//! its own: its effective gradient is at first the mean, by volume, of those of what it is made of. Where these are
+//! strained little and turn little against each other its energy is no more than theirs (Jensen); no objective energy is
+//! convex, so where they turn much it may be more, and what it changes by is booked. Changes of the rest state are
+//! objective: they do not change momentum.
 //! The energy that the decay takes, `−ds/dt ∂U/∂s`, is booked in the ledger.
 //!
 //! Which cell or part wakes or falls asleep with which prestrain is worked out in `state_transfer`. Accelerations do not

@@ -4,7 +4,7 @@ use super::{
     body::HybridBody,
     carried_skin::Carried,
     long_steps::LongStepHistory,
-    prestrain::PrestrainDecay,
+    prestrain::{PrestrainDecay, Progress},
     running::RunningPatch,
     staged_patch::StagedPatch,
     state::{HybridState, room_for_cells},
@@ -30,6 +30,15 @@ pub(crate) struct HybridScratch {
     pub(super) before: Before,
     pub(crate) transition: TransitionForce,
     pub(super) long_steps: LongStepHistory,
+    /// What decays within a tick, as a tick that is repeated or refused began with it.
+    decay_at_start: Decay,
+}
+
+/// The prestrain's progress, and [`HybridState::given_j`].
+#[derive(Debug, Clone, Copy, Default)]
+struct Decay {
+    prestrain: Progress,
+    given_j: f64,
 }
 
 impl HybridScratch {
@@ -54,7 +63,19 @@ impl HybridScratch {
             ),
             transition: TransitionForce::with_room(positions),
             long_steps: LongStepHistory::with_room(body.node_count(), positions),
+            decay_at_start: Decay::default(),
         }
+    }
+
+    /// Keeps what decays within a tick.
+    pub(super) fn keep_decay(&mut self, own: &HybridState) {
+        self.decay_at_start = Decay { prestrain: own.prestrain.progress(), given_j: own.given_j };
+    }
+
+    /// Restores what [`Self::keep_decay`] kept.
+    pub(super) fn put_decay_back(&self, own: &mut HybridState) {
+        own.prestrain.go_back(self.decay_at_start.prestrain);
+        own.given_j = self.decay_at_start.given_j;
     }
 
     /// Returns `fᵀ M'⁻¹ f` (N²/kg) of forces on free axes.

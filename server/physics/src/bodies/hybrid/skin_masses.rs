@@ -2,15 +2,17 @@
 use super::body::HybridBody;
 
 impl HybridBody {
-    /// Returns the masses (kg) that contact may take for those of the vertices of so cut a skin: with the area `A_v` of a vertex,
-    /// `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`. Each of a vertex's particles then bears what a
-    /// foundation does to the vertex per area.
+    /// Returns the masses (kg) that contact may take for those of the skin's vertices, if it is cut into these triangles:
+    /// with the area `A_v` of a vertex, `A_v min_p m_p/A_p` over its particles, `A_p = Σ_v w_vp A_v`. Each of a vertex's
+    /// particles then bears what a foundation does to the vertex per area.
     pub(crate) fn vertex_masses_kg(&self, triangles: &[[u32; 3]]) -> Vec<f64> {
         let mut vertex_m2 = vec![0.0; self.vertex_points.len()];
         for triangle in triangles {
             let [a, b, c] = triangle.map(|vertex| self.skin_rest_m()[vertex as usize]);
             let third = (b - a).cross(c - a).length() / 6.0;
-            triangle.iter().for_each(|&vertex| vertex_m2[vertex as usize] += third);
+            for &vertex in triangle {
+                vertex_m2[vertex as usize] += third;
+            }
         }
         let vertices = 0..self.vertex_points.len() as u32;
         let points = || vertices.clone().map(|vertex| self.carriers_of_vertex(vertex)).zip(&vertex_m2);
@@ -29,8 +31,7 @@ impl HybridBody {
     }
 
     /// Returns the masses (kg) by which what is pressed at the skin's vertices is borne where neighbours are pressed alike:
-    /// `min_p m_p/Σ_v w_vp` over the particles of each, the sum
-    /// over the vertices that may be pressed. Unlike [`Self::vertex_masses_kg`] it knows no areas: a vertex of
+    /// `min_p m_p/Σ_v w_vp` over the particles of each, the sum over the vertices that may be pressed. Unlike [`Self::vertex_masses_kg`] it knows no areas: a vertex of
     /// small triangles is borne by the same particles as its neighbours.
     pub(crate) fn bearing_masses_kg(&self, vertices: &[u32]) -> Vec<f64> {
         let points = || (0..self.vertex_points.len() as u32).map(|vertex| self.carriers_of_vertex(vertex));

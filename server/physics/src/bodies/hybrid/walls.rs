@@ -19,7 +19,7 @@ impl HybridBody {
         around: &EnvironmentSpec,
     ) -> Option<SelfContact> {
         let triangles = coarse_walls(skin.positions_m, &skin.surface.triangles, self.particles().spacing_m);
-        let surface = Surface::of_some(skin.positions_m.len(), &triangles);
+        let surface = Surface::of_triangles(skin.positions_m.len(), &triangles);
         let (mass_kg, bearing_kg) = (self.vertex_masses_kg(&triangles), self.bearing_masses_kg(&surface.nodes));
         let moduli = moduli::mean_over_corners(moduli_pa, &surface);
         let coarse =

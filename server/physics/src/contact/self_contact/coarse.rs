@@ -6,7 +6,7 @@
 //! a triangle would turn far, become a sliver, or have too long an edge, or where any vertex that went would be farther from the
 //! surface than is allowed. Skin that has an end, or meets itself along an edge, stays as it is there.
 use super::rest::twice_area_m2;
-use crate::contact::triangle::closest_weights;
+use crate::contact::triangle::closest_point;
 use glam::DVec3;
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -139,9 +139,13 @@ impl<'a> Coarsening<'a> {
         }
         for (triangle, corners) in becomes {
             self.triangles[triangle as usize] = Some(corners);
-            corners.iter().for_each(|corner| self.around[*corner as usize].push(triangle));
+            for corner in corners {
+                self.around[corner as usize].push(triangle);
+            }
         }
-        nearest.into_iter().for_each(|(vertex, triangle)| self.gone[triangle as usize].push(vertex));
+        for (vertex, triangle) in nearest {
+            self.gone[triangle as usize].push(vertex);
+        }
         for neighbour in neighbours.into_iter().filter(|n| *n != to && of_other.binary_search(n).is_err()) {
             self.offer(to, neighbour);
             self.offer(neighbour, to);
@@ -177,11 +181,8 @@ impl<'a> Coarsening<'a> {
         let gone = fan.flat_map(|triangle| &self.gone[triangle as usize]).copied().chain([goes]);
         gone.map(|vertex| {
             let y = self.at(vertex);
-            let distance_sq = |corners: [DVec3; 3]| {
-                let [wa, wb, wc] = closest_weights(y, corners);
-                y.distance_squared(corners[0] * wa + corners[1] * wb + corners[2] * wc)
-            };
-            let each = left_m.iter().map(|(triangle, corners)| (distance_sq(*corners), *triangle));
+            let distance_sq = |corners_m: [DVec3; 3]| y.distance_squared(closest_point(y, corners_m));
+            let each = left_m.iter().map(|(triangle, corners_m)| (distance_sq(*corners_m), *triangle));
             let (least_sq, triangle) = each.min_by(|one, other| one.0.total_cmp(&other.0))?;
             (least_sq <= most_sq).then_some((vertex, triangle))
         })
@@ -206,7 +207,9 @@ mod tests {
     fn passes(triangles: &[[u32; 3]]) -> BTreeMap<(u32, u32), u32> {
         let mut passes = BTreeMap::new();
         for &[a, b, c] in triangles {
-            [(a, b), (b, c), (c, a)].into_iter().for_each(|edge| *passes.entry(edge).or_default() += 1);
+            for edge in [(a, b), (b, c), (c, a)] {
+                *passes.entry(edge).or_default() += 1;
+            }
         }
         passes
     }
@@ -235,12 +238,9 @@ mod tests {
     /// Asserts that no vertex is farther from the surface than is allowed.
     fn assert_near(positions_m: &[DVec3], triangles: &[[u32; 3]], edge_m: f64) {
         for &y in positions_m {
-            let distance_m = |corners: &[u32; 3]| {
-                let corners_m = corners.map(|corner| positions_m[corner as usize]);
-                let [wa, wb, wc] = closest_weights(y, corners_m);
-                y.distance(corners_m[0] * wa + corners_m[1] * wb + corners_m[2] * wc)
-            };
-            let least_m = triangles.iter().map(distance_m).fold(f64::INFINITY, f64::min);
+            let corners_m = |corners: &[u32; 3]| corners.map(|corner| positions_m[corner as usize]);
+            let distances_m = triangles.iter().map(|corners| y.distance(closest_point(y, corners_m(corners))));
+            let least_m = distances_m.fold(f64::INFINITY, f64::min);
             assert!(least_m <= DEVIATION * edge_m * (1.0 + 1e-9), "{least_m}");
         }
     }
