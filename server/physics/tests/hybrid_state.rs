@@ -130,7 +130,8 @@ fn a_body_that_was_broken_and_reset_is_as_good_as_new() {
         drive.point_forces.push(PointForce { node: top(&rig), force_n: DVec3::Z * 1e300 });
         assert!(rig.tick(&drive).quarantined.is_some());
         rig.state.reset(&rig.model);
-        for radius_m in [11e-3, 5e-3, 6e-3, 7e-3, 8e-3, 9e-3, 10e-3, 4e-3] {
+        // Fewer particles first: more would write over what is left.
+        for radius_m in [4e-3, 5e-3, 6e-3, 7e-3, 8e-3, 9e-3, 10e-3, 11e-3, 5e-3] {
             for x_m in [0.0, 2e-3, -3e-3] {
                 press(&mut rig, x_m, radius_m);
                 press(&mut fresh, x_m, radius_m);
