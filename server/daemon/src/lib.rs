@@ -1,6 +1,7 @@
 //! `palpated`: the daemon that simulates a body at the haptic rate, and the offline commands on the same scenes.
 pub mod bodies;
 pub mod cli;
+pub mod doors;
 pub mod grpc;
 pub mod load;
 pub mod offline;

@@ -13,6 +13,10 @@ struct Bundle;
 /// Where the page finds the encoded `FileDescriptorSet` of `palpate.v1`.
 pub const DESCRIPTOR_PATH: &str = "palpate.v1.binpb";
 
+/// The page loads and asks for nothing but what is the daemon's, and is shown in no other page.
+const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; form-action 'none'; \
+                      frame-ancestors 'none'";
+
 /// Answers everything that is no gRPC call.
 pub fn serve(method: &Method, uri: &Uri) -> Response<Body> {
     if *method != Method::GET && *method != Method::HEAD {
@@ -36,6 +40,7 @@ fn found(mime: &'static str, body: Body) -> Response<Body> {
     // Names carry no hash: a browser asks again, so that page and daemon are of one version.
     headers.insert(header::CACHE_CONTROL, header::HeaderValue::from_static("no-cache"));
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, header::HeaderValue::from_static("nosniff"));
+    headers.insert(header::CONTENT_SECURITY_POLICY, header::HeaderValue::from_static(POLICY));
     response
 }
 

@@ -1,6 +1,7 @@
 //! The session outside the loop: its body, its tools and who drives them, and how one session replaces another.
 use crate::{
     bodies::served,
+    doors::refusals::Refusals,
     sim::{
         command::{Orders, Refusal, Request},
         exchange::{SurfaceEnd, ToolEnd},
@@ -197,6 +198,8 @@ pub struct Daemon {
     pub stop: CancellationToken,
     /// Tells when forces are zero.
     pub sign: StopSign,
+    /// Whoever was refused at the doors.
+    pub refusals: Arc<Refusals>,
     /// Samples dropped over all devices.
     pub samples_rejected: AtomicU64,
     pub(crate) current: RwLock<Arc<ActiveSession>>,

@@ -4,7 +4,7 @@ mod common;
 use common::{Daemon, block_scene};
 use palpate_proto::v1::{self, session_client::SessionClient};
 use palpated::{
-    grpc::listen::{ListenError, TlsFiles},
+    doors::{listen::ListenError, tls::TlsFiles},
     serve::{ServeConfig, ServeError, start},
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt};

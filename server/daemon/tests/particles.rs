@@ -104,7 +104,7 @@ async fn nothing_is_made_or_sent_for_those_that_do_not_ask() {
     let hub = Arc::clone(&daemon.running.as_ref().unwrap().daemon.hub);
     let mut plain = watch(&daemon, LevelOfDetail::Full, false).await;
     assert!(update_of(&mut plain, tick).await.1.active_particles.is_none());
-    let mut seat = hub.join(60.0, Layers { vertices: true, ..Layers::default() });
+    let mut seat = hub.join(60.0, Layers { vertices: true, ..Layers::default() }).unwrap();
     for _ in 0..5 {
         timeout(PATIENCE, seat.frames.changed()).await.unwrap().unwrap();
         let frame = seat.frames.borrow_and_update().clone().unwrap();

@@ -2,16 +2,21 @@
 pub mod convert;
 pub mod device;
 pub mod downlink;
-pub mod listen;
 pub mod news;
 pub mod session;
 pub mod surface;
 pub mod uplink;
 
 use crate::{
+    doors::{
+        bounds::MAX_SMALL_BYTES,
+        origin::{self, Guard},
+        whole::{self, Gate},
+    },
     page,
     session::{ActiveSession, Daemon},
 };
+use axum::Router;
 use palpate_proto::{
     DESCRIPTOR_SET, MAX_SNAPSHOT_BYTES,
     v1::{device_server::DeviceServer, session_server::SessionServer, surface_server::SurfaceServer},
@@ -23,28 +28,27 @@ use tonic_health::server::HealthReporter;
 use tonic_web::GrpcWebLayer;
 use tower::Layer;
 
-/// Largest message a client may send (bytes), snapshots apart.
-pub const MAX_REQUEST_BYTES: usize = 2 * 1024 * 1024;
-/// Largest message of a device's stream (bytes): a sample has some 150.
-pub const MAX_SAMPLE_BYTES: usize = 16 * 1024;
-
 /// The built-in descriptor set does not decode; a fault of the build.
 #[derive(Debug, Error)]
 #[error("the built-in descriptor set cannot be served by reflection: {0}")]
 pub struct ReflectionError(#[from] tonic_reflection::server::Error);
 
-/// Every service, each with gRPC-web, and the page as the fallback.
+/// Every service behind the gate, each with gRPC-web, and the page as the fallback.
 ///
 /// The gRPC-web layer is put around each service and not around the router: it would refuse the page's plain GETs.
 ///
 /// # Errors
 /// [`ReflectionError`].
-pub async fn routes(daemon: &Arc<Daemon>) -> Result<(Routes, HealthReporter), ReflectionError> {
+pub async fn routes(
+    daemon: &Arc<Daemon>,
+    gate: Gate,
+    guard: Guard,
+) -> Result<(Router, HealthReporter), ReflectionError> {
     let web = GrpcWebLayer::new();
     let device = DeviceServer::new(device::DeviceService { daemon: Arc::clone(daemon) })
-        .max_decoding_message_size(MAX_SAMPLE_BYTES);
+        .max_decoding_message_size(MAX_SMALL_BYTES);
     let surface = SurfaceServer::new(surface::SurfaceService { daemon: Arc::clone(daemon) })
-        .max_decoding_message_size(MAX_SAMPLE_BYTES);
+        .max_decoding_message_size(MAX_SMALL_BYTES);
     let session = SessionServer::new(session::SessionService { daemon: Arc::clone(daemon) })
         .max_decoding_message_size(MAX_SNAPSHOT_BYTES)
         .max_encoding_message_size(MAX_SNAPSHOT_BYTES);
@@ -61,17 +65,19 @@ pub async fn routes(daemon: &Arc<Daemon>) -> Result<(Routes, HealthReporter), Re
         .add_service(web.layer(surface))
         .add_service(web.layer(session))
         .add_service(web.layer(health_service))
-        .add_service(reflection().build_v1()?)
-        .add_service(reflection().build_v1alpha()?)
+        .add_service(reflection().build_v1()?.max_decoding_message_size(MAX_SMALL_BYTES))
+        .add_service(reflection().build_v1alpha()?.max_decoding_message_size(MAX_SMALL_BYTES))
         .into_axum_router()
-        .fallback(page_or_unimplemented);
-    Ok((Routes::from(router), health))
+        .fallback(page_or_unimplemented)
+        .layer(axum::middleware::from_fn_with_state(gate, whole::take))
+        // Asked first: layers are put around what is there.
+        .layer(axum::middleware::from_fn_with_state(guard, origin::check));
+    Ok((router, health))
 }
 
 /// A gRPC call of an unknown service gets gRPC's answer, everything else the page.
 async fn page_or_unimplemented(request: axum::extract::Request) -> axum::response::Response {
-    let is_grpc = request.headers().get("content-type").is_some_and(|t| t.as_bytes().starts_with(b"application/grpc"));
-    if is_grpc {
+    if whole::is_grpc(request.headers()) {
         let text = format!("there is no service at {}; reflection lists them", request.uri().path());
         let (parts, ()) = Status::unimplemented(text).into_http::<()>().into_parts();
         return axum::response::Response::from_parts(parts, axum::body::Body::empty());

@@ -1,6 +1,7 @@
 //! `palpate.v1.Session`.
-use super::{MAX_REQUEST_BYTES, convert, current_session};
+use super::{convert, current_session};
 use crate::{
+    doors::answer::Kept,
     load,
     session::{ActiveSession, Daemon, prepare},
     sim::{
@@ -14,7 +15,6 @@ use palpate_proto::{
     MAX_SNAPSHOT_BYTES,
     v1::{self, load_scene_request::Source as WireSource, session_server::Session},
 };
-use prost::Message;
 use std::sync::Arc;
 use tokio::sync::OwnedSemaphorePermit;
 use tonic::{Request, Response, Status};
@@ -112,16 +112,6 @@ async fn replace_scene(daemon: &Arc<Daemon>, source: WireSource) -> Result<Arc<A
     daemon.replace(prepared).await.map_err(refused)
 }
 
-/// Requests other than snapshots are small: what is larger was not meant for this daemon.
-fn small<M: Message>(request: Request<M>) -> Result<M, Status> {
-    let message = request.into_inner();
-    let bytes = message.encoded_len();
-    if bytes > MAX_REQUEST_BYTES {
-        return Err(Status::out_of_range(format!("the request has {bytes} bytes; at most {MAX_REQUEST_BYTES}")));
-    }
-    Ok(message)
-}
-
 #[tonic::async_trait]
 impl Session for SessionService {
     async fn list(&self, _: Request<v1::ListRequest>) -> Result<Response<v1::ListResponse>, Status> {
@@ -133,7 +123,7 @@ impl Session for SessionService {
         &self,
         request: Request<v1::LoadSceneRequest>,
     ) -> Result<Response<v1::LoadSceneResponse>, Status> {
-        let Some(source) = small(request)?.source else {
+        let Some(source) = request.into_inner().source else {
             return Err(Status::invalid_argument("say which scene: `builtin`, `path` or `toml`"));
         };
         if let WireSource::Toml(text) = &source
@@ -151,20 +141,20 @@ impl Session for SessionService {
     }
 
     async fn reset(&self, request: Request<v1::ResetRequest>) -> Result<Response<v1::ResetResponse>, Status> {
-        let session = current_session(&self.daemon, &small(request)?.session_id)?;
+        let session = current_session(&self.daemon, &request.into_inner().session_id)?;
         let (_, done) = self.order(&session, Order::Reset).await?;
         Ok(Response::new(v1::ResetResponse { tick: done.tick }))
     }
 
     async fn pause(&self, request: Request<v1::PauseRequest>) -> Result<Response<v1::PauseResponse>, Status> {
-        let request = small(request)?;
+        let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let (_, done) = self.order(&session, Order::Pause(request.paused)).await?;
         Ok(Response::new(v1::PauseResponse { paused: done.paused, tick: done.tick }))
     }
 
     async fn step(&self, request: Request<v1::StepRequest>) -> Result<Response<v1::StepResponse>, Status> {
-        let request = small(request)?;
+        let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let ticks = convert::step_ticks(request.ticks)?;
         let (_, done) = self.order(&session, Order::Step(ticks)).await?;
@@ -172,22 +162,25 @@ impl Session for SessionService {
     }
 
     async fn snapshot(&self, request: Request<v1::SnapshotRequest>) -> Result<Response<v1::SnapshotResponse>, Status> {
-        let session = current_session(&self.daemon, &small(request)?.session_id)?;
+        let session = current_session(&self.daemon, &request.into_inner().session_id)?;
         let (copy, _, room) = self.copy(&session).await?;
         let (tick, model) = (copy.state.mechanical.tick, Arc::clone(&session.model));
         let save = move || {
             let saved = (snapshot::save(&model, &copy.state), snapshot::state_hash(&copy.state));
-            drop((copy, room));
-            saved
+            drop(copy);
+            (saved, room)
         };
-        let (state, state_hash) = blocking(save).await?;
+        let ((state, state_hash), room) = blocking(save).await?;
         if state.len() > MAX_SNAPSHOT_BYTES {
             let megabytes = state.len() / 1_000_000;
             return Err(Status::resource_exhausted(format!(
                 "the snapshot would have {megabytes} MB; too large to send"
             )));
         }
-        Ok(Response::new(v1::SnapshotResponse { tick, state: state.into(), state_hash }))
+        let mut response = Response::new(v1::SnapshotResponse { tick, state: state.into(), state_hash });
+        // A state on its way is one beside the running one, however slowly it is read.
+        response.extensions_mut().insert(Kept::new(room));
+        Ok(response)
     }
 
     async fn restore(&self, request: Request<v1::RestoreRequest>) -> Result<Response<v1::RestoreResponse>, Status> {
@@ -209,7 +202,7 @@ impl Session for SessionService {
         &self,
         request: Request<v1::InjectForcesRequest>,
     ) -> Result<Response<v1::InjectForcesResponse>, Status> {
-        let request = small(request)?;
+        let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let forces = convert::injections(&session, &request.forces)?;
         let (_, done) = self.order(&session, Order::Inject(forces)).await?;
@@ -217,7 +210,7 @@ impl Session for SessionService {
     }
 
     async fn status(&self, request: Request<v1::StatusRequest>) -> Result<Response<v1::StatusResponse>, Status> {
-        let session = current_session(&self.daemon, &small(request)?.session_id)?;
+        let session = current_session(&self.daemon, &request.into_inner().session_id)?;
         let (copy, done, room) = self.copy(&session).await?;
         let daemon = Arc::clone(&self.daemon);
         let tell = move || {

@@ -1,6 +1,9 @@
 //! `palpate.v1.Surface`.
 use super::{convert, current_session};
-use crate::{session::Daemon, stream::viewer::Viewer};
+use crate::{
+    session::Daemon,
+    stream::{hub::MOST_VIEWERS, viewer::Viewer},
+};
 use futures_util::{Stream, stream};
 use palpate_proto::v1::{self, surface_server::Surface};
 use std::{pin::Pin, sync::Arc};
@@ -21,7 +24,8 @@ impl Surface for SurfaceService {
         let request = request.into_inner();
         current_session(&self.daemon, &request.session_id)?;
         let (rate_hz, layers) = convert::watch_request(&request, self.daemon.hub.display_rate_hz())?;
-        let seat = self.daemon.hub.join(rate_hz, layers);
+        let full = || Status::resource_exhausted(format!("{MOST_VIEWERS} viewers are watching: no more can"));
+        let seat = self.daemon.hub.join(rate_hz, layers).ok_or_else(full)?;
         let viewer = Viewer::new(seat, rate_hz, layers, self.daemon.stop.clone());
         let events = stream::unfold(viewer, |mut viewer| async move { viewer.next().await.map(|e| (Ok(e), viewer)) });
         Ok(Response::new(Box::pin(events)))

@@ -1,6 +1,6 @@
 //! Flags of `palpated serve`.
 use super::config::{ServeConfig, default_limits};
-use crate::grpc::listen::TlsFiles;
+use crate::doors::{bounds::Bounds, tls::TlsFiles};
 use clap::ValueEnum;
 use palpate_realtime::OsMeasures;
 use std::{net::SocketAddr, path::PathBuf};
@@ -26,6 +26,9 @@ pub struct ServeArgs {
     /// Listen on this Unix socket as well
     #[arg(long, value_name = "PATH")]
     pub unix: Option<PathBuf>,
+    /// A name of this machine under which browsers may open the page, beside its host name and addresses; may be given several times
+    #[arg(long = "host", value_name = "NAME")]
+    pub host_names: Vec<String>,
     /// Certificate chain (PEM): the port speaks TLS
     #[arg(long, value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
@@ -85,6 +88,8 @@ impl ServeArgs {
         ServeConfig {
             listen: self.listen,
             unix: self.unix.clone(),
+            bounds: Bounds::default(),
+            host_names: self.host_names.clone(),
             tls: tls.map(|(certificate, key)| TlsFiles { certificate, key }),
             simulated_arm: self.arm == Arm::Simulated,
             limits,

@@ -1,6 +1,10 @@
 //! Configuration of a daemon, parsed once.
 use super::ServeError;
-use crate::{grpc::convert::MAX_WATCH_RATE_HZ, grpc::listen::TlsFiles, sim::tool::ArmLimits};
+use crate::{
+    doors::{bounds::Bounds, tls::TlsFiles},
+    grpc::convert::MAX_WATCH_RATE_HZ,
+    sim::tool::ArmLimits,
+};
 use palpate_control::{ForceLimits, TorqueLimits, WatchdogSettings};
 use palpate_realtime::OsMeasures;
 use std::{
@@ -15,6 +19,10 @@ pub struct ServeConfig {
     pub listen: SocketAddr,
     /// Unix socket, beside.
     pub unix: Option<PathBuf>,
+    /// What connections and requests have to keep to.
+    pub bounds: Bounds,
+    /// Names of this machine by which browsers may ask for the page, beside its own.
+    pub host_names: Vec<String>,
     /// TLS on the port.
     pub tls: Option<TlsFiles>,
     /// Whether a simulated arm drives tools without a device.
@@ -44,6 +52,8 @@ impl ServeConfig {
         Self {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
             unix: None,
+            bounds: Bounds::default(),
+            host_names: Vec::new(),
             tls: None,
             simulated_arm: true,
             limits: default_limits(),

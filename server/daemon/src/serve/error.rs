@@ -1,8 +1,5 @@
 //! Why a daemon cannot start.
-use crate::{
-    grpc::{ReflectionError, listen::ListenError},
-    session::PrepareError,
-};
+use crate::{doors::listen::ListenError, grpc::ReflectionError, session::PrepareError};
 use miette::Diagnostic;
 use std::io;
 use thiserror::Error;

@@ -1,6 +1,6 @@
 //! The process: load, start, tell, wait for a signal, say goodbye.
 use super::{Runner, ServeConfig, ServeError, args::ServeArgs, report, start_with};
-use crate::{load, progress::Progress, sim::thread::Loop, telemetry};
+use crate::{doors::descriptors, load, progress::Progress, sim::thread::Loop, telemetry};
 use miette::IntoDiagnostic;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
@@ -25,7 +25,8 @@ pub fn run(args: &ServeArgs) -> miette::Result<ExitCode> {
 /// As [`run`].
 pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     telemetry::init();
-    let config = args.config()?;
+    let mut config = args.config()?;
+    config.bounds.connections = config.bounds.connections.min(descriptors::raise());
     let mut bar = Progress::new(&args.scene);
     let scene = load::from_argument(&args.scene, &mut |fraction, what| bar.show(fraction, what));
     bar.finish();

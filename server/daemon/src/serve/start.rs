@@ -1,7 +1,8 @@
 //! Wiring: prepare the session, start the loop, open the doors; and the way back when told to stop.
 use super::{ServeConfig, ServeError};
 use crate::{
-    grpc::{self, listen},
+    doors::{Doors, origin::Guard, whole::Gate},
+    grpc,
     progress::{BUILDING, Progress},
     session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
     sim::{
@@ -26,7 +27,6 @@ use tokio::{
     time::timeout,
 };
 use tokio_util::sync::CancellationToken;
-use tonic::service::Routes;
 
 /// States that requests may hold beside the running one: copies for status and snapshots, and restored ones.
 const MOST_STATES: usize = 8;
@@ -89,7 +89,7 @@ pub async fn start_with(
     run: Runner,
 ) -> Result<Running, ServeError> {
     let config = config.checked()?;
-    let doors = Doors::open(&config).await?;
+    let doors = Doors::open(config.listen, config.tls.as_ref(), config.unix.as_deref()).await?;
     let hub = Hub::new(config.display_rate_hz);
     let numbers = Numbers::new(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()));
     let settings = SessionSettings {
@@ -115,6 +115,7 @@ pub async fn start_with(
         settings,
         stop,
         sign,
+        refusals: Arc::default(),
         samples_rejected: AtomicU64::new(0),
         current: RwLock::new(Arc::clone(&session)),
         numbers,
@@ -122,42 +123,14 @@ pub async fn start_with(
         room_for_states: Arc::new(Semaphore::new(MOST_STATES)),
     });
     daemon.show(&session, surface);
-    let (routes, health) = grpc::routes(&daemon).await?;
+    let gate = Gate::new(config.bounds, &daemon.refusals);
+    let guard = Guard::new(&config.host_names, &daemon.refusals);
+    let (router, health) = grpc::routes(&daemon, gate, guard).await?;
     let address = doors.address;
     let closing = CancellationToken::new();
-    let servers = doors.serve(&routes, &closing);
+    let servers = doors.serve(&router, config.bounds, &daemon.refusals, &closing);
     let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), the_loop, health, servers, closing, config));
     Ok(Running { address, notes, daemon, ended })
-}
-
-struct Doors {
-    address: SocketAddr,
-    tcp: (tonic::transport::Server, tonic::transport::server::TcpIncoming),
-    unix: Option<(tonic::transport::Server, tokio_stream::wrappers::UnixListenerStream)>,
-}
-
-type Servers = JoinSet<Result<(), tonic::transport::Error>>;
-
-impl Doors {
-    async fn open(config: &ServeConfig) -> Result<Self, ServeError> {
-        let server = listen::server(config.tls.as_ref())?;
-        let (incoming, address) = listen::tcp(config.listen).await?;
-        let unix = match &config.unix {
-            Some(path) => Some((listen::server(None)?, listen::unix(path).await?)),
-            None => None,
-        };
-        Ok(Self { address, tcp: (server, incoming), unix })
-    }
-
-    fn serve(self, routes: &Routes, closing: &CancellationToken) -> Servers {
-        let mut servers = JoinSet::new();
-        let (server, incoming) = self.tcp;
-        servers.spawn(listen::serve_tcp(server, routes.clone(), incoming, closing.clone()));
-        if let Some((server, incoming)) = self.unix {
-            servers.spawn(listen::serve_unix(server, routes.clone(), incoming, closing.clone()));
-        }
-        servers
-    }
 }
 
 /// The loop's thread, once it has asked the operating system for its measures.
@@ -191,7 +164,7 @@ async fn until_stopped(
     daemon: Arc<Daemon>,
     thread: thread::JoinHandle<()>,
     health: tonic_health::server::HealthReporter,
-    mut servers: Servers,
+    mut servers: JoinSet<()>,
     closing: CancellationToken,
     config: ServeConfig,
 ) -> Summary {

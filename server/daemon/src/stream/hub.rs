@@ -121,6 +121,9 @@ impl Frame {
     }
 }
 
+/// Viewers at a time.
+pub const MOST_VIEWERS: usize = 1024;
+
 /// Counts viewers and hands out the newest frame.
 #[derive(Debug)]
 pub struct Hub {
@@ -201,18 +204,23 @@ impl Hub {
         self.skipped.load(Ordering::Relaxed)
     }
 
-    /// Adds a viewer that wants so many updates per second (Hz), with these layers.
-    pub fn join(self: &Arc<Self>, rate_hz: f64, layers: Layers) -> Seat {
+    /// Adds a viewer that wants so many updates per second (Hz), with these layers; `None`: there are [`MOST_VIEWERS`].
+    pub fn join(self: &Arc<Self>, rate_hz: f64, layers: Layers) -> Option<Seat> {
         let viewer = self.next_viewer.fetch_add(1, Ordering::Relaxed);
         let frames = self.frames.subscribe();
+        let mut is_full = false;
         self.change_wishes(|wishes| {
+            is_full = wishes.len() >= MOST_VIEWERS;
+            if is_full {
+                return;
+            }
             if wishes.is_empty() {
                 // Nobody watched: the newest frame may be minutes old, or of another scene.
                 self.frames.send_replace(None);
             }
             wishes.push(Wish { viewer, rate_hz, layers });
         });
-        Seat { hub: Arc::clone(self), viewer, frames }
+        (!is_full).then(|| Seat { hub: Arc::clone(self), viewer, frames })
     }
 
     fn change_wishes(&self, change: impl FnOnce(&mut Vec<Wish>)) {

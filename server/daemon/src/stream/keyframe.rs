@@ -4,8 +4,8 @@ use glam::DVec3;
 use palpate_physics::Model;
 use palpate_proto::v1;
 
-/// Largest payload of one chunk (bytes): a quarter of a MiB, where gRPC's usual limit is 4 MiB.
-pub const CHUNK_BYTES: usize = 256 * 1024;
+/// Largest payload of one chunk (bytes): what a viewer that does not read makes the daemon hold.
+pub const CHUNK_BYTES: usize = 64 * 1024;
 
 /// Rest positions of surface vertices as the viewer has them (f32, m): displacements are taken from these.
 pub fn rest_positions_f32(model: &Model) -> Vec<[f32; 3]> {

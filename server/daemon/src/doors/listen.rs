@@ -1,26 +1,16 @@
-//! Sockets: TCP with or without TLS, and Unix.
+//! Sockets: TCP and Unix; and why one cannot be had.
+use super::{bounds::KEEPALIVE_INTERVAL, refusals::Peer};
 use miette::Diagnostic;
 use std::{
     fs, io,
     net::SocketAddr,
     os::unix::fs::FileTypeExt,
     path::{Path, PathBuf},
-    time::Duration,
 };
 use thiserror::Error;
-use tokio::net::{TcpListener, UnixListener, UnixStream};
-use tokio_stream::wrappers::UnixListenerStream;
-use tokio_util::sync::CancellationToken;
-use tonic::{
-    service::Routes,
-    transport::{Identity, Server, ServerTlsConfig, server::TcpIncoming},
-};
-
-/// Dead peers are noticed after these two.
-const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
-const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Streams on one connection at a time.
-const MAX_STREAMS: u32 = 256;
+use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio_stream::StreamExt as _;
+use tonic::transport::server::TcpIncoming;
 
 /// Why a socket cannot be opened.
 #[derive(Debug, Error, Diagnostic)]
@@ -76,43 +66,41 @@ pub enum ListenError {
     },
 }
 
-/// Certificate chain and key (PEM files).
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TlsFiles {
-    /// Certificate chain.
-    pub certificate: PathBuf,
-    /// Private key.
-    pub key: PathBuf,
+/// A socket that is listened on.
+#[derive(Debug)]
+pub enum Listener {
+    /// By TCP.
+    Tcp(TcpIncoming),
+    /// On a Unix socket.
+    Unix(UnixListener),
 }
 
-/// A server with this daemon's limits.
-///
-/// # Errors
-/// [`ListenError::TlsFile`] or [`ListenError::Tls`].
-pub fn server(tls: Option<&TlsFiles>) -> Result<Server, ListenError> {
-    let server = Server::builder()
-        // The page speaks HTTP/1.1 where there is no TLS.
-        .accept_http1(true)
-        .max_concurrent_streams(MAX_STREAMS)
-        .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
-        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT));
-    let Some(files) = tls else { return Ok(server) };
-    let read = |what, path: &Path| {
-        fs::read(path).map_err(|source| ListenError::TlsFile { what, path: path.to_owned(), source })
-    };
-    let identity = Identity::from_pem(read("certificate", &files.certificate)?, read("key", &files.key)?);
-    let refuse = |error: tonic::transport::Error| {
-        let reason = std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string);
-        ListenError::Tls { path: files.certificate.clone(), reason }
-    };
-    server.tls_config(ServerTlsConfig::new().identity(identity)).map_err(refuse)
+/// A connection, accepted.
+#[derive(Debug)]
+pub(super) enum Socket {
+    Tcp(TcpStream),
+    Unix(UnixStream),
+}
+
+impl Listener {
+    /// The next connection, and who is at its other end.
+    pub(super) async fn accept(&mut self) -> Option<io::Result<(Socket, Peer)>> {
+        match self {
+            Self::Tcp(incoming) => incoming.next().await.map(|accepted| {
+                let stream = accepted?;
+                let peer = Peer::Tcp(stream.peer_addr()?);
+                Ok((Socket::Tcp(stream), peer))
+            }),
+            Self::Unix(listener) => Some(listener.accept().await.map(|(stream, _)| (Socket::Unix(stream), Peer::Unix))),
+        }
+    }
 }
 
 /// Listens on TCP; small messages go out at once, and dead peers are noticed without HTTP/2 as well.
 ///
 /// # Errors
 /// [`ListenError::Busy`] or [`ListenError::Bind`].
-pub async fn tcp(address: SocketAddr) -> Result<(TcpIncoming, SocketAddr), ListenError> {
+pub async fn tcp(address: SocketAddr) -> Result<(Listener, SocketAddr), ListenError> {
     let refuse = |source: io::Error| match source.kind() {
         io::ErrorKind::AddrInUse => ListenError::Busy { address },
         _ => ListenError::Bind { address, source },
@@ -120,14 +108,14 @@ pub async fn tcp(address: SocketAddr) -> Result<(TcpIncoming, SocketAddr), Liste
     let listener = TcpListener::bind(address).await.map_err(refuse)?;
     let bound = listener.local_addr().map_err(refuse)?;
     let incoming = TcpIncoming::from(listener).with_nodelay(Some(true)).with_keepalive(Some(KEEPALIVE_INTERVAL));
-    Ok((incoming, bound))
+    Ok((Listener::Tcp(incoming), bound))
 }
 
 /// Listens on a Unix socket. A socket that nobody answers on is left over from a daemon that crashed, and replaced.
 ///
 /// # Errors
 /// [`ListenError::Unix`].
-pub async fn unix(path: &Path) -> Result<UnixListenerStream, ListenError> {
+pub async fn unix(path: &Path) -> Result<Listener, ListenError> {
     let refuse = |source| ListenError::Unix { path: path.to_owned(), source };
     if fs::symlink_metadata(path).is_ok_and(|meta| meta.file_type().is_socket()) {
         if UnixStream::connect(path).await.is_ok() {
@@ -135,31 +123,5 @@ pub async fn unix(path: &Path) -> Result<UnixListenerStream, ListenError> {
         }
         fs::remove_file(path).map_err(refuse)?;
     }
-    Ok(UnixListenerStream::new(UnixListener::bind(path).map_err(refuse)?))
-}
-
-/// Serves until `stop`, then waits for open streams to end.
-///
-/// # Errors
-/// The transport's.
-pub async fn serve_tcp(
-    mut server: Server,
-    routes: Routes,
-    incoming: TcpIncoming,
-    stop: CancellationToken,
-) -> Result<(), tonic::transport::Error> {
-    server.add_routes(routes).serve_with_incoming_shutdown(incoming, stop.cancelled_owned()).await
-}
-
-/// The same on a Unix socket.
-///
-/// # Errors
-/// The transport's.
-pub async fn serve_unix(
-    mut server: Server,
-    routes: Routes,
-    incoming: UnixListenerStream,
-    stop: CancellationToken,
-) -> Result<(), tonic::transport::Error> {
-    server.add_routes(routes).serve_with_incoming_shutdown(incoming, stop.cancelled_owned()).await
+    Ok(Listener::Unix(UnixListener::bind(path).map_err(refuse)?))
 }

@@ -1,0 +1,76 @@
+//! The numbers that connections and requests have to keep to.
+use palpate_proto::MAX_SNAPSHOT_BYTES;
+use std::time::Duration;
+
+/// What connections have to keep to. Tests make them small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bounds {
+    /// Connections at a time, over all sockets. One more takes the place of the oldest that has asked for nothing yet.
+    pub connections: usize,
+    /// Requests at a time, streams of viewers among them, those of devices apart.
+    pub requests: usize,
+    /// Streams of devices at a time, those that have not said hello yet among them.
+    pub attachments: usize,
+    /// How long a TLS handshake may take.
+    pub handshake: Duration,
+    /// How long a connection may take until its first request has been asked for.
+    pub first_request: Duration,
+    /// How long a connection may be without a request after that.
+    pub idle: Duration,
+    /// How long a peer may leave a part of an answer that is there for it.
+    pub mute: Duration,
+    /// How long headers of HTTP/1.1 may take.
+    pub headers: Duration,
+    /// How long a request may be without a further byte.
+    pub stall: Duration,
+    /// How long a request may take to come.
+    pub request: Duration,
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self {
+            connections: 4096,
+            requests: 2048,
+            attachments: 64,
+            handshake: Duration::from_secs(5),
+            first_request: Duration::from_secs(10),
+            idle: Duration::from_secs(300),
+            mute: Duration::from_secs(60),
+            headers: Duration::from_secs(5),
+            stall: Duration::from_secs(5),
+            request: Duration::from_secs(60),
+        }
+    }
+}
+
+/// Dead peers are noticed after these two.
+pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
+/// See [`KEEPALIVE_INTERVAL`].
+pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Streams on one connection at a time.
+pub const STREAMS: u32 = 256;
+/// Bytes of an answer that a stream holds for a peer that does not read, beside the message that is being sent.
+pub const SEND_BUFFER_BYTES: usize = 16 * 1024;
+/// Bytes of a request's headers.
+pub const HEADER_LIST_BYTES: u32 = 16 * 1024;
+/// Bytes that a stream's and a connection's requests may be ahead of what has been read of them: a sample has some 150.
+pub const STREAM_WINDOW_BYTES: u32 = 256 * 1024;
+/// See [`STREAM_WINDOW_BYTES`].
+pub const CONNECTION_WINDOW_BYTES: u32 = 1024 * 1024;
+/// Bytes that all larger requests together hold until they have been answered.
+pub const HELD_BYTES: usize = 2 * MAX_SNAPSHOT_BYTES;
+
+/// Largest message of requests that carry a scene or forces (bytes).
+pub const MAX_REQUEST_BYTES: usize = 2 * 1024 * 1024;
+/// Largest message of all others (bytes): a sample of a device has some 150.
+pub const MAX_SMALL_BYTES: usize = 16 * 1024;
+
+/// Largest message of a method (bytes), by its path.
+pub fn message_bytes(path: &str) -> usize {
+    match path {
+        "/palpate.v1.Session/Restore" => MAX_SNAPSHOT_BYTES,
+        "/palpate.v1.Session/LoadScene" | "/palpate.v1.Session/InjectForces" => MAX_REQUEST_BYTES,
+        _ => MAX_SMALL_BYTES,
+    }
+}

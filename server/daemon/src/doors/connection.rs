@@ -1,0 +1,190 @@
+//! Connections: accepted, given a place, served, and closed when they ask for nothing or take nothing.
+use super::{
+    answer::{Answer, Debts, Kept},
+    bounds::{self, Bounds},
+    crowd::{Crowd, Place},
+    listen::{Listener, Socket},
+    refusals::{Peer, Reason, Refusals},
+    whole::{self, ATTACH},
+};
+use axum::{Router, body::Body};
+use hyper::{Request, body::Incoming, service::service_fn};
+use hyper_util::{
+    rt::{TokioExecutor, TokioIo, TokioTimer},
+    server::conn::auto,
+};
+use std::{convert::Infallible, io, pin::pin, sync::Arc, time::Duration};
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    sync::Semaphore,
+    task::JoinSet,
+    time::{Instant, sleep, sleep_until, timeout},
+};
+use tokio_rustls::TlsAcceptor;
+use tokio_util::sync::CancellationToken;
+use tonic::Status;
+use tower::ServiceExt as _;
+
+/// How long a socket is left alone when the operating system gives no further descriptor.
+const NO_DESCRIPTOR_PAUSE: Duration = Duration::from_millis(50);
+/// What is asked for after the doors have closed is refused; what is open then may end.
+const LOOK_AFTER: Duration = Duration::from_secs(1);
+
+/// Receives connections of one socket.
+#[derive(Clone)]
+pub(super) struct Host {
+    pub(super) router: Router,
+    pub(super) bounds: Bounds,
+    pub(super) requests: Arc<Semaphore>,
+    pub(super) attachments: Arc<Semaphore>,
+    pub(super) tls: Option<TlsAcceptor>,
+    pub(super) crowd: Arc<Crowd>,
+    pub(super) refusals: Arc<Refusals>,
+    pub(super) closing: CancellationToken,
+}
+
+impl Host {
+    /// Accepts until the doors close, then waits for the connections to end. They are cut when this is dropped.
+    pub(super) async fn receive(self, mut listener: Listener) {
+        let mut connections = JoinSet::new();
+        loop {
+            tokio::select! {
+                () = self.closing.cancelled() => break,
+                Some(_) = connections.join_next(), if !connections.is_empty() => {}
+                accepted = listener.accept() => match accepted {
+                    Some(Ok((socket, peer))) => self.admit(socket, peer, &mut connections),
+                    Some(Err(error)) => self.not_accepted(&error).await,
+                    None => break,
+                },
+            }
+        }
+        // Nobody may connect from here on: who tries is refused by the system, and does not wait in vain.
+        drop(listener);
+        while connections.join_next().await.is_some() {}
+    }
+
+    fn admit(&self, socket: Socket, peer: Peer, connections: &mut JoinSet<()>) {
+        let Some((place, has_evicted)) = self.crowd.enter() else {
+            return self.refusals.count(Reason::Full, Some(peer));
+        };
+        if has_evicted {
+            self.refusals.count(Reason::Evicted, None);
+        }
+        let host = self.clone();
+        connections.spawn(async move {
+            match socket {
+                Socket::Tcp(stream) => match &host.tls {
+                    None => host.serve(stream, peer, place).await,
+                    Some(acceptor) => match timeout(host.bounds.handshake, acceptor.accept(stream)).await {
+                        Ok(Ok(stream)) => host.serve(stream, peer, place).await,
+                        _ => host.refusals.count(Reason::Handshake, Some(peer)),
+                    },
+                },
+                Socket::Unix(stream) => host.serve(stream, peer, place).await,
+            }
+        });
+    }
+
+    /// A peer that went away before it was accepted costs nothing. Without descriptors, whoever is idle gives one up, and the
+    /// socket is left alone for a while: it stays ready.
+    async fn not_accepted(&self, error: &io::Error) {
+        let of_system = error.raw_os_error().map(rustix::io::Errno::from_raw_os_error);
+        if !matches!(of_system, Some(rustix::io::Errno::MFILE | rustix::io::Errno::NFILE)) {
+            tracing::debug!(%error, "a connection was not accepted");
+            return;
+        }
+        self.refusals.count(Reason::NoDescriptor, None);
+        if self.crowd.evict() {
+            self.refusals.count(Reason::Evicted, None);
+        }
+        sleep(NO_DESCRIPTOR_PAUSE).await;
+    }
+
+    async fn serve<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(&self, stream: S, peer: Peer, place: Place) {
+        let (place, debts) = (Arc::new(place), Arc::new(Debts::default()));
+        let service = service_fn(|mut request: Request<Incoming>| {
+            let router = self.router.clone();
+            let mut answer = Answer::begin(&place, &debts);
+            request.extensions_mut().insert(peer);
+            let room = self.room(request.uri().path(), peer);
+            async move {
+                let Some(room) = room else {
+                    let busy = whole::refused(
+                        &Status::resource_exhausted("too many requests: try again later"),
+                        request.headers(),
+                    );
+                    return Ok(busy.map(|body| answer.is(body)));
+                };
+                answer.keep(room);
+                let Ok(mut response) = router.oneshot(request.map(Body::new)).await;
+                if let Some(kept) = response.extensions_mut().remove::<Kept>() {
+                    answer.keep(kept);
+                }
+                Ok::<_, Infallible>(response.map(|body| answer.is(body)))
+            }
+        });
+        let server = self.protocol();
+        let mut connection = pin!(server.serve_connection(TokioIo::new(stream), service));
+        let mut is_closing = false;
+        loop {
+            tokio::select! {
+                ended = &mut connection => {
+                    if let Err(error) = ended {
+                        tracing::debug!(%peer, %error, "a connection ended early");
+                    }
+                    return;
+                }
+                () = self.closing.cancelled(), if !is_closing => {
+                    is_closing = true;
+                    connection.as_mut().graceful_shutdown();
+                }
+                () = place.gone().cancelled() => return,
+                reason = overdue(&place, &debts, self.bounds) => {
+                    return self.refusals.count(reason, Some(peer));
+                }
+            }
+        }
+    }
+
+    /// Room for one more request of its kind. Devices have their own: viewers cannot take it.
+    fn room(&self, path: &str, peer: Peer) -> Option<Kept> {
+        let of = if path == ATTACH { &self.attachments } else { &self.requests };
+        let permit = Arc::clone(of).try_acquire_owned();
+        permit.map(Kept::new).inspect_err(|_| self.refusals.count(Reason::Busy, Some(peer))).ok()
+    }
+
+    fn protocol(&self) -> auto::Builder<TokioExecutor> {
+        let mut server = auto::Builder::new(TokioExecutor::new());
+        server
+            .http2()
+            .timer(TokioTimer::new())
+            .keep_alive_interval(Some(bounds::KEEPALIVE_INTERVAL))
+            .keep_alive_timeout(bounds::KEEPALIVE_TIMEOUT)
+            .max_concurrent_streams(bounds::STREAMS)
+            .max_send_buf_size(bounds::SEND_BUFFER_BYTES)
+            .max_header_list_size(bounds::HEADER_LIST_BYTES)
+            .initial_stream_window_size(bounds::STREAM_WINDOW_BYTES)
+            .initial_connection_window_size(bounds::CONNECTION_WINDOW_BYTES);
+        // The page speaks HTTP/1.1 where there is no TLS.
+        server.http1().timer(TokioTimer::new()).header_read_timeout(self.bounds.headers);
+        server
+    }
+}
+
+/// Waits until a connection has asked for nothing, or taken nothing of an answer, for too long.
+async fn overdue(place: &Place, debts: &Debts, bounds: Bounds) -> Reason {
+    loop {
+        let now = Instant::now();
+        let idle_until =
+            place.idle_since().map(|since| since + if place.has_asked() { bounds.idle } else { bounds.first_request });
+        let mute_until = debts.oldest().map(|since| since + bounds.mute);
+        match (idle_until, mute_until) {
+            (Some(until), _) if until <= now => return if place.has_asked() { Reason::Idle } else { Reason::Silent },
+            (_, Some(until)) if until <= now => return Reason::Mute,
+            (idle, mute) => {
+                let look = now + bounds.first_request.min(bounds.mute).min(LOOK_AFTER);
+                sleep_until(idle.into_iter().chain(mute).chain([look]).min().unwrap_or(look)).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Who was refused at the doors, counted by reason, and logged at most once a second for each.
+use std::{
+    fmt,
+    net::SocketAddr,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
+use tokio::time::Instant;
+
+/// Who is at the other end of a connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Peer {
+    /// By TCP.
+    Tcp(SocketAddr),
+    /// A process of this machine, by the Unix socket.
+    Unix,
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(address) => address.fmt(f),
+            Self::Unix => f.write_str("a process of this machine"),
+        }
+    }
+}
+
+/// Why a connection or a request was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// The operating system gives no further descriptor.
+    NoDescriptor,
+    /// All places are taken by connections that are in use.
+    Full,
+    /// As many requests are being answered as there may be.
+    Busy,
+    /// Its place was given to another, as it had asked for nothing.
+    Evicted,
+    /// Its TLS handshake failed, or took too long.
+    Handshake,
+    /// It asked for nothing in time.
+    Silent,
+    /// It has asked for nothing any more for long.
+    Idle,
+    /// A web page of another, or a call that no client of gRPC makes.
+    Foreign,
+    /// A message is larger than its method's may be.
+    TooLarge,
+    /// A request did not come to its end in time.
+    TooSlow,
+    /// All requests together hold as much as they may.
+    NoRoom,
+    /// A peer took nothing of its answer for too long.
+    Mute,
+}
+
+/// Every reason, with its name in counters and what it means to whoever reads the log.
+pub const REASONS: [(Reason, &str, &str); 12] = [
+    (
+        Reason::NoDescriptor,
+        "no_descriptor",
+        "no connection can be accepted: the process has no descriptor left (LimitNOFILE)",
+    ),
+    (Reason::Full, "full", "a connection was refused: all places are taken"),
+    (Reason::Busy, "busy", "a request was refused: as many are being answered as there may be"),
+    (Reason::Evicted, "evicted", "a connection that had asked for nothing was closed, to let another in"),
+    (Reason::Handshake, "handshake", "a TLS handshake failed or took too long"),
+    (Reason::Silent, "silent", "a connection was closed, as it asked for nothing"),
+    (Reason::Idle, "idle", "a connection was closed, as it had asked for nothing any more"),
+    (Reason::Foreign, "foreign", "a request was refused: it came from a web page of others, or is no call of gRPC"),
+    (Reason::TooLarge, "too_large", "a request was refused: its message is too large"),
+    (Reason::TooSlow, "too_slow", "a request was refused: it did not come to its end in time"),
+    (Reason::NoRoom, "no_room", "a request was refused: others hold as much memory as all may"),
+    (Reason::Mute, "mute", "a connection was closed: nothing of its answer was taken for too long"),
+];
+
+/// Between two lines of the log for one reason.
+const LOG_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Counters by reason.
+#[derive(Debug, Default)]
+pub struct Refusals {
+    counts: [AtomicU64; REASONS.len()],
+    logged: Mutex<[Option<Instant>; REASONS.len()]>,
+}
+
+impl Refusals {
+    /// Counts one, and logs it unless another of its kind has just been.
+    pub fn count(&self, reason: Reason, peer: Option<Peer>) {
+        let Some(index) = REASONS.iter().position(|(other, ..)| *other == reason) else { return };
+        let count = self.counts[index].fetch_add(1, Ordering::Relaxed) + 1;
+        let now = Instant::now();
+        {
+            let mut logged = self.logged.lock().unwrap_or_else(PoisonError::into_inner);
+            if logged[index].is_some_and(|then| now - then < LOG_INTERVAL) {
+                return;
+            }
+            logged[index] = Some(now);
+        }
+        let peer = peer.map(|peer| peer.to_string());
+        let (_, name, meaning) = REASONS[index];
+        tracing::warn!(peer, reason = name, count, "{meaning}");
+    }
+
+    /// How often, by now.
+    pub fn of(&self, reason: Reason) -> u64 {
+        let index = REASONS.iter().position(|(other, ..)| *other == reason);
+        index.map_or(0, |index| self.counts[index].load(Ordering::Relaxed))
+    }
+
+    /// Names and counts of all reasons that there were.
+    pub fn all(&self) -> Vec<(&'static str, u64)> {
+        let counts = self.counts.iter().map(|count| count.load(Ordering::Relaxed));
+        REASONS.iter().map(|(_, name, _)| *name).zip(counts).filter(|(_, count)| *count > 0).collect()
+    }
+}
