@@ -2,7 +2,7 @@
 use crate::{ViewError, cli, connect::Server};
 use palpate_proto::v1::{AwakeFor, Percentiles, StatusRequest, StatusResponse, session_client::SessionClient};
 use serde_json::json;
-use std::fmt::Write as _;
+use std::{collections::BTreeMap, fmt::Write as _};
 
 /// Runs `status`.
 ///
@@ -98,6 +98,10 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
         line("probe", format!("{}: {}", probe.name, measured(&probe.components, &probe.values, &probe.unit)));
     }
     line("viewers", format!("{} ({} frames skipped)", status.viewers, status.frames_skipped));
+    if !status.refusals.is_empty() {
+        let counts: Vec<_> = status.refusals.iter().map(|of| format!("{} {}", of.count, of.reason)).collect();
+        line("refused", format!("{} (connections and requests; docs/protocol.md says why)", counts.join(", ")));
+    }
     rows
 }
 
@@ -197,6 +201,7 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "probes": status.probes.iter().map(|p| json!({"name": p.name, "unit": p.unit, "components": p.components, "values": p.values})).collect::<Vec<_>>(),
         "viewers": status.viewers,
         "frames_skipped": status.frames_skipped,
+        "refusals": status.refusals.iter().map(|of| (of.reason.clone(), of.count)).collect::<BTreeMap<_, _>>(),
         "samples_rejected": status.samples_rejected,
         "quarantine": status.quarantine,
         "state_warnings": status.state_warnings,

@@ -48,6 +48,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         active_particles: copy.state.awake_particles() as u32,
         awake_for: copy.state.awake_for(&session.model, &copy.injected).map(awake_for),
         state_warnings: state_warnings(session, copy),
+        refusals: refusals(daemon),
     }
 }
 
@@ -55,6 +56,11 @@ fn awake_for(counts: AwakeFor) -> v1::AwakeFor {
     let AwakeFor { tools, loads, injected, nothing } = counts;
     let [tools, loads, injected_forces, nothing] = [tools, loads, injected, nothing].map(|count| count as u32);
     v1::AwakeFor { tools, loads, injected_forces, nothing }
+}
+
+fn refusals(daemon: &Daemon) -> Vec<v1::RefusalCount> {
+    let count = |(reason, count): (&str, u64)| v1::RefusalCount { reason: reason.to_owned(), count };
+    daemon.refusals.all().into_iter().map(count).collect()
 }
 
 /// What is wrong with the body as it is.

@@ -117,18 +117,18 @@ async fn http(daemon: &Daemon, request: &str) -> String {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_browser_gets_the_page_and_grpc_web_on_the_same_port() {
     let daemon = Daemon::on(block_scene("block", 2)).await;
-    let page = http(&daemon, "GET / HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").await;
+    let page = http(&daemon, "GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").await;
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("<!doctype html>"), "{page}");
-    let missing = http(&daemon, "GET /nothing HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n").await;
+    let missing = http(&daemon, "GET /nothing HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").await;
     assert!(missing.starts_with("HTTP/1.1 404"), "{missing}");
-    let list = "POST /palpate.v1.Session/List HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\
+    let list = "POST /palpate.v1.Session/List HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
                 Content-Type: application/grpc-web+proto\r\nContent-Length: 5\r\n\r\n\0\0\0\0\0";
     let answer = http(&daemon, list).await;
     assert!(
         answer.starts_with("HTTP/1.1 200") && answer.contains("block") && answer.contains("grpc-status:0"),
         "{answer}"
     );
-    let unknown = "POST /palpate.v9.Session/List HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\
+    let unknown = "POST /palpate.v9.Session/List HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\
                    Content-Type: application/grpc-web+proto\r\nContent-Length: 5\r\n\r\n\0\0\0\0\0";
     assert!(http(&daemon, unknown).await.contains("grpc-status: 12"));
     // Garbage closes the connection and nothing else.

@@ -94,7 +94,7 @@ async fn an_announced_message_costs_what_has_come_of_it() {
     let channels = [another_channel(&daemon).await, another_channel(&daemon).await];
     let announce = |n: usize| {
         let path = ["Session/Restore", "Session/LoadScene", "Session/Pause", "Surface/Watch", "Device/Attach"][n % 5];
-        let most = if n % 5 == 0 { 64 << 20 } else { 16 << 10 };
+        let most = if n.is_multiple_of(5) { 64 << 20 } else { 16 << 10 };
         let (path, channel) = (format!("/palpate.v1.{path}"), channels[n % 2].clone());
         tokio::spawn(async move { call(&channel, &path, vec![prefix(most), vec![0; 11]], true).await })
     };
@@ -172,7 +172,9 @@ async fn unfinished_requests_hold_a_bounded_amount_together() {
     daemon.pause().await;
     let ended: Vec<_> = calls.iter().filter(|call| call.is_finished()).collect();
     assert!(ended.len() <= 1, "the others are waited for");
-    calls.map(|call| call.abort());
+    for call in calls {
+        call.abort();
+    }
     // What they held is given back.
     let restore = v1::RestoreRequest { state: vec![7; 60 << 20].into(), ..Default::default() };
     let again = || async { daemon.session().restore(restore.clone()).await.unwrap_err().code() };
@@ -194,11 +196,11 @@ async fn silent_connections_keep_nobody_out() {
         silent.push(connect(&daemon).await);
     }
     let channel = another_channel(&daemon).await;
-    let mut session = palpate_proto::v1::session_client::SessionClient::new(channel);
+    let mut session = v1::session_client::SessionClient::new(channel);
     session.status(v1::StatusRequest::default()).await.unwrap();
     assert!(count(&daemon, Reason::Evicted) >= 200 - 32, "{}", count(&daemon, Reason::Evicted));
     assert_eq!(count(&daemon, Reason::Full), 0);
-    arm.hold_until(above(), |command| command.echo_sequence > 0).await;
+    arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     for socket in &mut silent[..100] {
         assert!(is_closed(socket).await);
     }
@@ -231,7 +233,7 @@ async fn whoever_comes_when_all_places_are_in_use_is_refused() {
         }
         assert!(Instant::now() < until, "their places never become free");
     }
-    arm.hold_until(above(), |command| command.echo_sequence > 0).await;
+    arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }
 
@@ -242,7 +244,7 @@ async fn connections_that_ask_for_nothing_are_closed() {
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
     // Nothing; half of HTTP/2's preface; half of a request's headers.
-    for said in [&b""[..], b"PRI * HTTP/2.0\r\n", b"GET / HTTP/1.1\r\nHost: x\r\nX-A: "] {
+    for said in [&b""[..], b"PRI * HTTP/2.0\r\n", b"GET / HTTP/1.1\r\nHost: localhost\r\nX-A: "] {
         let mut socket = connect(&daemon).await;
         socket.write_all(said).await.unwrap();
         assert!(is_closed(&mut socket).await, "{said:?}");
@@ -250,9 +252,9 @@ async fn connections_that_ask_for_nothing_are_closed() {
     assert!(count(&daemon, Reason::Silent) >= 2, "{}", count(&daemon, Reason::Silent));
     // One that has asked once may be idle for longer, not for ever.
     let mut socket = connect(&daemon).await;
-    socket.write_all(b"GET / HTTP/1.1\r\nHost: x\r\n\r\n").await.unwrap();
+    socket.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
     assert!(is_closed(&mut socket).await);
-    arm.hold_until(above(), |command| command.echo_sequence > 0).await;
+    arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }
 
@@ -290,7 +292,7 @@ async fn a_peer_that_does_not_read_its_answers_is_sent_away() {
     eventually(|| daemon.running.as_ref().unwrap().daemon.hub.viewer_count() == 60, "60 viewers").await;
     eventually(|| count(&daemon, Reason::Mute) == 1, "they are sent away").await;
     eventually(|| daemon.running.as_ref().unwrap().daemon.hub.viewer_count() == 0, "their places are free").await;
-    arm.hold_until(above(), |command| command.echo_sequence > 0).await;
+    arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }
 
@@ -308,7 +310,7 @@ async fn as_many_requests_are_answered_as_there_may_be_and_devices_have_room_of_
     assert_eq!((refused.code(), count(&daemon, Reason::Busy)), (Code::ResourceExhausted, 1), "{refused:?}");
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
-    arm.hold_until(above(), |command| command.echo_sequence > 0).await;
+    arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     drop(viewers.pop());
     let until = Instant::now() + PATIENCE;
     while surface.watch(v1::WatchRequest::default()).await.is_err() {

@@ -35,11 +35,11 @@ impl Default for Bounds {
             attachments: 64,
             handshake: Duration::from_secs(5),
             first_request: Duration::from_secs(10),
-            idle: Duration::from_secs(300),
-            mute: Duration::from_secs(60),
+            idle: Duration::from_mins(5),
+            mute: Duration::from_mins(1),
             headers: Duration::from_secs(5),
             stall: Duration::from_secs(5),
-            request: Duration::from_secs(60),
+            request: Duration::from_mins(1),
         }
     }
 }

@@ -81,6 +81,10 @@ pub fn farewell(summary: &Summary) -> String {
     for (name, histogram) in STAGES.iter().zip(&timing.stages) {
         row(&format!("  {name}"), histogram);
     }
+    if !summary.refusals.is_empty() {
+        let counts: Vec<_> = summary.refusals.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        let _ = writeln!(text, "refused connections and requests: {}", counts.join(", "));
+    }
     let _ = write!(
         text,
         "{} ticks, {} overruns, {} ticks skipped, {} ticks repeated, {} inputs refused, {} samples rejected, {} frames skipped{}",

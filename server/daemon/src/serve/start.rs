@@ -54,6 +54,8 @@ pub struct Summary {
     pub frames_skipped: u64,
     /// Samples dropped over all devices.
     pub samples_rejected: u64,
+    /// Connections and requests refused, by reason.
+    pub refusals: Vec<(&'static str, u64)>,
     /// Connections that did not end in time and were cut.
     pub cut: bool,
     /// What made the daemon stop without being told to.
@@ -204,6 +206,7 @@ async fn until_stopped(
         timing: Arc::clone(&daemon.timing),
         frames_skipped: daemon.hub.frames_skipped(),
         samples_rejected: daemon.samples_rejected.load(std::sync::atomic::Ordering::Relaxed),
+        refusals: daemon.refusals.all(),
         cut,
         failure,
     }
