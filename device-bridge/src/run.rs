@@ -9,6 +9,7 @@ use crate::{
     vrpn_server,
 };
 use palpate_control::{EnergyMeter, Link, StiffnessBound};
+use palpate_realtime::os::Granted;
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
     path::PathBuf,
@@ -21,6 +22,8 @@ use std::{
 use tokio::{sync::oneshot, task::JoinError, time};
 use tokio_util::sync::CancellationToken;
 
+/// How far the priority of the stream is below the servo's.
+const BELOW_THE_SERVO: u8 = 10;
 /// How often changes of the link are looked for.
 const WATCH_PERIOD: Duration = Duration::from_millis(20);
 /// Beyond the ramp, how long the servo may take to stop.
@@ -140,6 +143,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     shared.unmeasured.store(settings.uplink.across_network.is_some(), Ordering::Relaxed);
     let _no_servo_alone = StopOnDrop(Arc::clone(&shared));
     let mut servo_done = start_servo(servo, &settings).await?;
+    let _granted = prefer_the_stream(settings.measures);
     let end = CancellationToken::new();
     let _no_stream_alone = end.clone().drop_guard();
     let server = server.map(|server| tokio::spawn(server.run(end.clone())));
@@ -175,6 +179,17 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         Ok(result) => result.map(|()| shared.stats.summary()),
         Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
     }
+}
+
+/// Gives this thread, on which the stream to the daemon is, a priority right below the servo's: other programs of the machine do not
+/// delay it. Where that is refused, the servo has said so.
+fn prefer_the_stream(of_servo: OsMeasures) -> Option<Granted> {
+    let priority = of_servo.fifo_priority?.saturating_sub(BELOW_THE_SERVO).max(1);
+    let granted = OsMeasures { fifo_priority: Some(priority), ..OsMeasures::NONE }.apply();
+    for note in granted.notes.iter().filter(|note| note.granted) {
+        tracing::info!("stream to the daemon: {note}");
+    }
+    Some(granted)
 }
 
 /// A guard, where it can help; without one the arm's own patience is all there is, which is said.

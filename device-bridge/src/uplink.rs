@@ -7,7 +7,7 @@ use crate::{
     settings::UplinkSettings,
 };
 use palpate_proto::{
-    connect::{is_transport, why_no_answer, why_unreachable, words_of},
+    connect::{connect_arm, is_nobody_there, is_transport, why_no_answer, why_unreachable, words_of},
     v1::{self, device_client::DeviceClient, device_down::Message},
 };
 use palpate_realtime::{Clock, Doorbell, Histogram, SlotReader, SlotWriter};
@@ -21,7 +21,7 @@ use std::{
 use tokio::net::unix::pipe;
 use tokio_stream::Stream;
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
-use tonic::{Code, Status, Streaming};
+use tonic::{Code, Status, Streaming, transport::Channel};
 
 /// Longest wait for the daemon's welcome, and for its end of a stream that we ended.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
@@ -83,6 +83,8 @@ impl Stream for UpStream {
 enum Ended {
     /// The daemon cannot be reached.
     Unreachable(String),
+    /// Something is there, and does not speak as a daemon does.
+    Misunderstood(String),
     /// It answered, and refused.
     Refused(Status),
     /// It was attached, and is no longer.
@@ -155,7 +157,7 @@ impl Uplink {
                 }
                 format!("the daemon at {address} refused the arm: {}", status.message())
             }
-            Ended::Unreachable(reason) | Ended::Lost(reason) => {
+            Ended::Unreachable(reason) | Ended::Misunderstood(reason) | Ended::Lost(reason) => {
                 if let Some(limit) = self.settings.give_up_after.filter(|limit| never_attached && since_start > *limit)
                 {
                     let (address, reason) = (address.clone(), reason.clone());
@@ -174,17 +176,26 @@ impl Uplink {
         Ok(())
     }
 
+    /// One connection, with an arm's sign first. What stands between, and daemons of before, may know nothing of it: then without.
     async fn connection(&mut self) -> Ended {
+        match self.connection_signed(true).await {
+            Ended::Misunderstood(_) if !self.end.is_cancelled() => self.connection_signed(false).await,
+            ended => ended,
+        }
+    }
+
+    async fn connection_signed(&mut self, is_signed: bool) -> Ended {
         // Ends the outbound half whichever way this function returns, so that two streams never share the source.
         let stream_end = self.end.child_token();
         let _ended_on_return = stream_end.clone().drop_guard();
         let connected = tokio::select! {
             () = self.end.cancelled() => return Ended::ByUs,
-            connected = self.settings.endpoint.connect() => connected,
+            connected = self.connect(is_signed) => connected,
         };
         let channel = match connected {
             Ok(channel) => channel,
-            Err(error) => return Ended::Unreachable(why_unreachable(&error)),
+            Err(error) if is_nobody_there(&error) => return Ended::Unreachable(why_unreachable(&error)),
+            Err(error) => return Ended::Misunderstood(why_unreachable(&error)),
         };
         let up = UpStream {
             hello: Some(convert::hello(&self.settings)),
@@ -203,8 +214,8 @@ impl Uplink {
             attached = tokio::time::timeout(ANSWER_TIMEOUT, attach) => attached,
         };
         match attached {
-            Err(_) => Ended::Unreachable(format!("it sent no welcome within {ANSWER_TIMEOUT:?}")),
-            Ok(Err(status)) if is_transport(&status) => Ended::Unreachable(why_no_answer(&status)),
+            Err(_) => Ended::Misunderstood(format!("it sent no welcome within {ANSWER_TIMEOUT:?}")),
+            Ok(Err(status)) if is_transport(&status) => Ended::Misunderstood(why_no_answer(&status)),
             // What stands before a daemon that is down says so in these.
             Ok(Err(status)) if matches!(status.code(), Code::Unavailable | Code::Unknown) => {
                 Ended::Unreachable(status.message().to_owned())
@@ -215,6 +226,13 @@ impl Uplink {
                 Err(reason) => Ended::Refused(Status::failed_precondition(reason)),
             },
         }
+    }
+
+    async fn connect(&self, is_signed: bool) -> Result<Channel, tonic::transport::Error> {
+        if is_signed {
+            return connect_arm(&self.settings.endpoint, &self.settings.address).await;
+        }
+        self.settings.endpoint.connect().await
     }
 
     async fn attached(&mut self, mut down: Streaming<v1::DeviceDown>, welcome: &Welcome) -> Ended {

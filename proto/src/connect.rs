@@ -1,14 +1,21 @@
 //! From a daemon's address to an endpoint: `http://HOST:PORT`, `https://HOST:PORT` with a certificate authority, or
 //! `unix:///path/to/socket`.
+use crate::ARM_SIGN;
+use hyper_util::rt::TokioIo;
 use std::{
     fs, io,
     path::{Path, PathBuf},
     time::Duration,
 };
 use thiserror::Error;
+use tokio::{
+    io::AsyncWriteExt as _,
+    net::{TcpStream, UnixStream},
+};
+use tokio_util::either::Either;
 use tonic::{
     Status,
-    transport::{Certificate, ClientTlsConfig, Endpoint},
+    transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Uri},
 };
 
 /// Longest wait for a connection.
@@ -75,12 +82,37 @@ pub fn endpoint(address: &str, authority: Option<&Path>) -> Result<Endpoint, Con
     }
 }
 
+/// Connects an arm to a daemon: with the sign by which the daemon serves it before all viewers, whatever these do.
+///
+/// `address` is the one that the endpoint was made of.
+///
+/// # Errors
+/// The transport's.
+pub async fn connect_arm(endpoint: &Endpoint, address: &str) -> Result<Channel, tonic::transport::Error> {
+    let path = address.strip_prefix("unix://").map(str::to_owned);
+    let connector = tower::service_fn(move |uri: Uri| {
+        let path = path.clone();
+        async move {
+            if let Some(path) = path {
+                let mut stream = UnixStream::connect(path).await?;
+                stream.write_all(ARM_SIGN).await?;
+                return Ok::<_, io::Error>(TokioIo::new(Either::Left(stream)));
+            }
+            // An address of IPv6 stands in brackets.
+            let host = uri.host().unwrap_or_default().trim_matches(['[', ']']).to_owned();
+            let mut stream = TcpStream::connect((host, uri.port_u16().unwrap_or_default())).await?;
+            stream.set_nodelay(true)?;
+            stream.write_all(ARM_SIGN).await?;
+            Ok(TokioIo::new(Either::Right(stream)))
+        }
+    });
+    endpoint.connect_with_connector(connector).await
+}
+
 /// Why a connection was not made: what that means, and the transport's words.
 pub fn why_unreachable(error: &(dyn std::error::Error + 'static)) -> String {
     let words = causes(error).trim_start_matches("transport error: ").to_owned();
-    let chain = std::iter::successors(Some(error), |error| error.source());
-    let kind = chain.filter_map(|error| error.downcast_ref::<io::Error>()).map(io::Error::kind).last();
-    let meaning = match kind {
+    let meaning = match kind_of(error) {
         // What the TLS library finds wrong has no kind of its own.
         _ if words.contains("InvalidContentType") => "it does not speak TLS: write http:// in its place",
         _ if words.contains("UnknownIssuer") || words.contains("BadSignature") => {
@@ -91,6 +123,16 @@ pub fn why_unreachable(error: &(dyn std::error::Error + 'static)) -> String {
         _ => return words,
     };
     format!("{meaning} ({words})")
+}
+
+/// Whether a connection was not made because nothing listens at the address.
+pub fn is_nobody_there(error: &(dyn std::error::Error + 'static)) -> bool {
+    matches!(kind_of(error), Some(io::ErrorKind::ConnectionRefused | io::ErrorKind::NotFound))
+}
+
+fn kind_of(error: &(dyn std::error::Error + 'static)) -> Option<io::ErrorKind> {
+    let chain = std::iter::successors(Some(error), |error| error.source());
+    chain.filter_map(|error| error.downcast_ref::<io::Error>()).map(io::Error::kind).last()
 }
 
 /// Why a connection that was made is no daemon's, when it broke before the first answer.

@@ -17,6 +17,10 @@ pub const DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/palp
 /// Largest snapshot that is sent and may be restored (bytes): some 600 000 nodes. Clients have to raise tonic's limit of 4 MiB to it.
 pub const MAX_SNAPSHOT_BYTES: usize = 64 * 1024 * 1024;
 
+/// What an arm's connection may begin with, before TLS and HTTP/2, to be served by the daemon's thread for arms. No other protocol
+/// of the port begins with its first byte.
+pub const ARM_SIGN: &[u8; 16] = b"\xA7palpate-arm/1\r\n";
+
 #[cfg(test)]
 mod tests {
     use prost::Message;

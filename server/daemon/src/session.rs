@@ -36,6 +36,8 @@ pub struct SessionSettings {
     pub simulated_arm: bool,
     /// Folders below which scene files may be loaded by viewers.
     pub scene_folders: Vec<PathBuf>,
+    /// Where streams of arms are served, and tools' bells heard.
+    pub arms: tokio::runtime::Handle,
 }
 
 /// Why a scene cannot be run.
@@ -262,6 +264,7 @@ pub fn prepare(
         arm: scene.arm.filter(|_| settings.simulated_arm),
         limits: settings.limits,
         demand: Arc::clone(&hub.demand),
+        arms: settings.arms.clone(),
     })
     .map_err(PrepareError::Slots)?;
     let seat = |((end, spec), for_devices): ((ToolEnd, &palpate_physics::contact::ToolSpec), bool)| ToolSeat {

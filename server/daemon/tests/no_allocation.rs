@@ -49,6 +49,7 @@ fn watched_and_restored(scene: Scene, ticks: u32, is_awake: impl Fn(&State) -> b
         arm: None,
         limits: default_limits(),
         demand: Arc::clone(&demand),
+        arms: tokio::runtime::Handle::current(),
     })
     .unwrap();
     let mut bench = Bench { simulation, ends, demand, clock: Clock::Monotonic, timing: Timing::default() };
@@ -87,6 +88,7 @@ impl Bench {
             arm: Some(ScriptedHand { tool: 0, tool_name: "finger".into(), path: path(&keyframes) }),
             limits: default_limits(),
             demand: Arc::clone(&demand),
+            arms: tokio::runtime::Handle::current(),
         })
         .unwrap();
         Self { simulation, ends, demand, clock: Clock::Monotonic, timing: Timing::default() }

@@ -36,6 +36,7 @@ fn session(number: u64, scene: Scene, demand: &Arc<Demand>) -> (Box<Simulation>,
         arm: Some(ScriptedHand { tool: 0, tool_name: "finger".into(), path: path(&keyframes) }),
         limits: default_limits(),
         demand: Arc::clone(demand),
+        arms: tokio::runtime::Handle::current(),
     })
     .unwrap();
     (simulation, ends, model)

@@ -65,6 +65,7 @@ impl Bench {
             arm: hand_m.map(hand),
             limits: default_limits(),
             demand: Arc::new(Demand::default()),
+            arms: tokio::runtime::Handle::current(),
         })
         .unwrap();
         let (clock, time) = Clock::manual();

@@ -3,6 +3,7 @@ use super::{
     answer::{Answer, Debts, Kept},
     bounds::{self, Bounds},
     crowd::{Crowd, Place},
+    lane::{self, Arms},
     listen::{Listener, Socket},
     refusals::{Peer, Reason, Refusals},
     whole::{self, ATTACH},
@@ -37,6 +38,8 @@ pub(super) struct Host {
     pub(super) bounds: Bounds,
     pub(super) requests: Arc<Semaphore>,
     pub(super) attachments: Arc<Semaphore>,
+    /// Where arms' connections are served.
+    pub(super) arms: Option<Arc<Arms>>,
     pub(super) tls: Option<TlsAcceptor>,
     pub(super) crowd: Arc<Crowd>,
     pub(super) refusals: Arc<Refusals>,
@@ -71,18 +74,51 @@ impl Host {
             self.refusals.count(Reason::Evicted, None);
         }
         let host = self.clone();
+        let gone = place.gone().clone();
         connections.spawn(async move {
-            match socket {
-                Socket::Tcp(stream) => match &host.tls {
-                    None => host.serve(stream, peer, place).await,
-                    Some(acceptor) => match timeout(host.bounds.handshake, acceptor.accept(stream)).await {
-                        Ok(Ok(stream)) => host.serve(stream, peer, place).await,
-                        _ => host.refusals.count(Reason::Handshake, Some(peer)),
-                    },
-                },
-                Socket::Unix(stream) => host.serve(stream, peer, place).await,
+            tokio::select! {
+                () = gone.cancelled() => {}
+                () = host.meet(socket, peer, place) => {}
             }
         });
+    }
+
+    /// Looks who it is: an arm's connection goes to the arms' lane.
+    async fn meet(&self, mut socket: Socket, peer: Peer, place: Place) {
+        let Ok(met) = timeout(self.bounds.first_request, lane::is_signed(&socket)).await else {
+            return self.refusals.count(Reason::Silent, Some(peer));
+        };
+        match (met, &self.arms) {
+            (Ok(false), _) => self.serve(socket, peer, &Arc::new(place)).await,
+            (Ok(true), Some(arms)) => {
+                if !matches!(timeout(self.bounds.handshake, lane::read_sign(&mut socket)).await, Ok(Ok(()))) {
+                    return self.refusals.count(Reason::Handshake, Some(peer));
+                }
+                // Its place among all others is free again.
+                drop(place);
+                match arms.host.crowd.enter() {
+                    Some((of_arm, _)) => arms.serve(socket, peer, Arc::new(of_arm)).await,
+                    None => self.refusals.count(Reason::Full, Some(peer)),
+                }
+            }
+            (Ok(true), None) => self.refusals.count(Reason::Handshake, Some(peer)),
+            // It is gone already.
+            (Err(_), _) => {}
+        }
+    }
+
+    /// Serves a connection to its end.
+    pub(super) async fn serve(&self, socket: Socket, peer: Peer, place: &Arc<Place>) {
+        match socket {
+            Socket::Tcp(stream) => match &self.tls {
+                None => self.attend(stream, peer, place).await,
+                Some(acceptor) => match timeout(self.bounds.handshake, acceptor.accept(stream)).await {
+                    Ok(Ok(stream)) => self.attend(stream, peer, place).await,
+                    _ => self.refusals.count(Reason::Handshake, Some(peer)),
+                },
+            },
+            Socket::Unix(stream) => self.attend(stream, peer, place).await,
+        }
     }
 
     /// A peer that went away before it was accepted costs nothing. Without descriptors, whoever is idle gives one up, and the
@@ -100,11 +136,16 @@ impl Host {
         sleep(NO_DESCRIPTOR_PAUSE).await;
     }
 
-    async fn serve<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(&self, stream: S, peer: Peer, place: Place) {
-        let (place, debts) = (Arc::new(place), Arc::new(Debts::default()));
+    async fn attend<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
+        &self,
+        stream: S,
+        peer: Peer,
+        place: &Arc<Place>,
+    ) {
+        let debts = Arc::new(Debts::default());
         let service = service_fn(|mut request: Request<Incoming>| {
             let router = self.router.clone();
-            let mut answer = Answer::begin(&place, &debts);
+            let mut answer = Answer::begin(place, &debts);
             request.extensions_mut().insert(peer);
             let room = self.room(request.uri().path(), peer);
             async move {
@@ -139,7 +180,7 @@ impl Host {
                     connection.as_mut().graceful_shutdown();
                 }
                 () = place.gone().cancelled() => return,
-                reason = overdue(&place, &debts, self.bounds) => {
+                reason = overdue(place, &debts, self.bounds) => {
                     return self.refusals.count(reason, Some(peer));
                 }
             }

@@ -82,6 +82,41 @@ pub(super) enum Socket {
     Unix(UnixStream),
 }
 
+/// A connection that no runtime watches.
+#[derive(Debug)]
+pub(super) enum FreeSocket {
+    Tcp(std::net::TcpStream),
+    Unix(std::os::unix::net::UnixStream),
+}
+
+impl Socket {
+    /// Waits until there is something to read.
+    pub(super) async fn readable(&self) -> io::Result<()> {
+        match self {
+            Self::Tcp(stream) => stream.readable().await,
+            Self::Unix(stream) => stream.readable().await,
+        }
+    }
+
+    /// Gives it up.
+    pub(super) fn into_std(self) -> io::Result<FreeSocket> {
+        Ok(match self {
+            Self::Tcp(stream) => FreeSocket::Tcp(stream.into_std()?),
+            Self::Unix(stream) => FreeSocket::Unix(stream.into_std()?),
+        })
+    }
+}
+
+impl FreeSocket {
+    /// Lets the present runtime watch it.
+    pub(super) fn watched(self) -> io::Result<Socket> {
+        Ok(match self {
+            Self::Tcp(stream) => Socket::Tcp(TcpStream::from_std(stream)?),
+            Self::Unix(stream) => Socket::Unix(UnixStream::from_std(stream)?),
+        })
+    }
+}
+
 impl Listener {
     /// The next connection, and who is at its other end.
     pub(super) async fn accept(&mut self) -> Option<io::Result<(Socket, Peer)>> {

@@ -7,6 +7,7 @@ pub mod bounds;
 mod connection;
 pub mod crowd;
 pub mod descriptors;
+pub mod lane;
 pub mod listen;
 pub mod origin;
 pub mod refusals;
@@ -17,13 +18,23 @@ use axum::Router;
 use bounds::Bounds;
 use connection::Host;
 use crowd::Crowd;
+use lane::Arms;
 use listen::{ListenError, Listener};
 use refusals::Refusals;
 use std::{net::SocketAddr, path::Path, sync::Arc};
 use tls::TlsFiles;
-use tokio::{sync::Semaphore, task::JoinSet};
+use tokio::{runtime::Handle, sync::Semaphore, task::JoinSet};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
+
+/// What is served.
+#[derive(Debug, Clone)]
+pub struct Routers {
+    /// To everybody.
+    pub all: Router,
+    /// To connections of arms: no more than they need.
+    pub arms: Router,
+}
 
 /// Open sockets that nobody is let in by yet.
 pub struct Doors {
@@ -49,10 +60,11 @@ impl Doors {
         Ok(Self { address, tcp, tls, unix })
     }
 
-    /// Lets everybody in until `closing`; the tasks end when the last connection has.
+    /// Lets everybody in until `closing`, arms by their own lane; the tasks end when the last connection has.
     pub fn serve(
         self,
-        router: &Router,
+        routers: &Routers,
+        arms: &Handle,
         bounds: Bounds,
         refusals: &Arc<Refusals>,
         closing: &CancellationToken,
@@ -61,19 +73,25 @@ impl Doors {
         let crowd = Crowd::of(bounds.connections);
         let requests = Arc::new(Semaphore::new(bounds.requests));
         let attachments = Arc::new(Semaphore::new(bounds.attachments));
-        let host = |tls| Host {
+        let arms_crowd = Crowd::of(bounds.attachments);
+        let host = |router: &Router, crowd: &Arc<Crowd>, arms, tls| Host {
             router: router.clone(),
+            arms,
             bounds,
             requests: Arc::clone(&requests),
             attachments: Arc::clone(&attachments),
             tls,
-            crowd: Arc::clone(&crowd),
+            crowd: Arc::clone(crowd),
             refusals: Arc::clone(refusals),
             closing: closing.clone(),
         };
-        servers.spawn(host(self.tls).receive(self.tcp));
+        let both = |tls: Option<TlsAcceptor>| {
+            let of_arms = host(&routers.arms, &arms_crowd, None, tls.clone());
+            host(&routers.all, &crowd, Some(Arc::new(Arms { handle: arms.clone(), host: of_arms })), tls)
+        };
+        servers.spawn(both(self.tls).receive(self.tcp));
         if let Some(unix) = self.unix {
-            servers.spawn(host(None).receive(unix));
+            servers.spawn(both(None).receive(unix));
         }
         servers
     }

@@ -9,6 +9,7 @@ pub mod uplink;
 
 use crate::{
     doors::{
+        Routers,
         bounds::MAX_SMALL_BYTES,
         origin::{self, Guard},
         whole::{self, Gate},
@@ -16,7 +17,6 @@ use crate::{
     page,
     session::{ActiveSession, Daemon},
 };
-use axum::Router;
 use palpate_proto::{
     DESCRIPTOR_SET, MAX_SNAPSHOT_BYTES,
     v1::{device_server::DeviceServer, session_server::SessionServer, surface_server::SurfaceServer},
@@ -43,7 +43,7 @@ pub async fn routes(
     daemon: &Arc<Daemon>,
     gate: Gate,
     guard: Guard,
-) -> Result<(Router, HealthReporter), ReflectionError> {
+) -> Result<(Routers, HealthReporter), ReflectionError> {
     let web = GrpcWebLayer::new();
     let device = DeviceServer::new(device::DeviceService { daemon: Arc::clone(daemon) })
         .max_decoding_message_size(MAX_SMALL_BYTES);
@@ -61,7 +61,8 @@ pub async fn routes(
             .register_encoded_file_descriptor_set(DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let router = Routes::new(web.layer(device))
+    let arms = Routes::new(device.clone()).into_axum_router();
+    let all = Routes::new(web.layer(device))
         .add_service(web.layer(surface))
         .add_service(web.layer(session))
         .add_service(web.layer(health_service))
@@ -72,7 +73,7 @@ pub async fn routes(
         .layer(axum::middleware::from_fn_with_state(gate, whole::take))
         // Asked first: layers are put around what is there.
         .layer(axum::middleware::from_fn_with_state(guard, origin::check));
-    Ok((router, health))
+    Ok((Routers { all, arms }, health))
 }
 
 /// A gRPC call of an unknown service gets gRPC's answer, everything else the page.

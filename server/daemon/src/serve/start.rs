@@ -1,7 +1,7 @@
 //! Wiring: prepare the session, start the loop, open the doors; and the way back when told to stop.
 use super::{ServeConfig, ServeError};
 use crate::{
-    doors::{Doors, origin::Guard, whole::Gate},
+    doors::{Doors, lane::Lane, origin::Guard, whole::Gate},
     grpc,
     progress::{BUILDING, Progress},
     session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
@@ -30,6 +30,8 @@ use tokio_util::sync::CancellationToken;
 
 /// States that requests may hold beside the running one: copies for status and snapshots, and restored ones.
 const MOST_STATES: usize = 8;
+/// How far the priority of arms' streams is below the loop's.
+const BELOW_THE_LOOP: u8 = 10;
 /// How long open streams may take to end once forces are zero.
 const STREAMS_END_WITHIN: Duration = Duration::from_secs(2);
 
@@ -92,12 +94,15 @@ pub async fn start_with(
 ) -> Result<Running, ServeError> {
     let config = config.checked()?;
     let doors = Doors::open(config.listen, config.tls.as_ref(), config.unix.as_deref()).await?;
+    let system = |source| ServeError::System { what: "thread for arms", source };
+    let lane = Lane::start(of_lane(config.measures)).await.map_err(system)?;
     let hub = Hub::new(config.display_rate_hz);
     let numbers = Numbers::new(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()));
     let settings = SessionSettings {
         limits: config.limits,
         simulated_arm: config.simulated_arm,
         scene_folders: config.scene_folders.clone(),
+        arms: lane.handle.clone(),
     };
     let mut bar = Progress::new(&scene.name);
     let prepared = prepare(scene, &settings, &numbers, &hub, &mut |part| bar.show(part, BUILDING));
@@ -106,8 +111,11 @@ pub async fn start_with(
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();
-    let (notes, the_loop) =
+    let (mut notes, the_loop) =
         start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.measures, run).await?;
+    // A refusal is for the same reason as the loop's, which says what to do.
+    let of_arms = lane.notes.iter().filter(|note| note.granted);
+    notes.extend(of_arms.map(|note| Note { granted: true, text: format!("streams of arms: {}", note.text) }));
     tokio::spawn(clerk.work());
     let daemon = Arc::new(Daemon {
         orders,
@@ -127,12 +135,18 @@ pub async fn start_with(
     daemon.show(&session, surface);
     let gate = Gate::new(config.bounds, &daemon.refusals);
     let guard = Guard::new(&config.host_names, &daemon.refusals);
-    let (router, health) = grpc::routes(&daemon, gate, guard).await?;
+    let (routers, health) = grpc::routes(&daemon, gate, guard).await?;
     let address = doors.address;
     let closing = CancellationToken::new();
-    let servers = doors.serve(&router, config.bounds, &daemon.refusals, &closing);
-    let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), the_loop, health, servers, closing, config));
+    let servers = doors.serve(&routers, &lane.handle, config.bounds, &daemon.refusals, &closing);
+    let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), the_loop, health, servers, lane, closing, config));
     Ok(Running { address, notes, daemon, ended })
+}
+
+/// Arms' streams come before everything but the loop; its memory is locked for the whole process.
+fn of_lane(of_loop: OsMeasures) -> OsMeasures {
+    let fifo_priority = of_loop.fifo_priority.map(|priority| priority.saturating_sub(BELOW_THE_LOOP).max(1));
+    OsMeasures { fifo_priority, ..OsMeasures::NONE }
 }
 
 /// The loop's thread, once it has asked the operating system for its measures.
@@ -167,6 +181,7 @@ async fn until_stopped(
     thread: thread::JoinHandle<()>,
     health: tonic_health::server::HealthReporter,
     mut servers: JoinSet<()>,
+    lane: Lane,
     closing: CancellationToken,
     config: ServeConfig,
 ) -> Summary {
@@ -199,6 +214,7 @@ async fn until_stopped(
     let all_ended = async { while servers.join_next().await.is_some() {} };
     let cut = timeout(STREAMS_END_WITHIN, all_ended).await.is_err();
     servers.abort_all();
+    drop(lane);
     if let Some(path) = &config.unix {
         let _ = std::fs::remove_file(path);
     }

@@ -11,6 +11,7 @@ use glam::DVec3;
 use palpate_physics::{Model, Scratch, State, contact::ToolTarget};
 use palpate_scene::{Driver, ScriptedHand, Timeline};
 use std::{io, sync::Arc};
+use tokio::runtime::Handle;
 
 /// A session in the loop.
 #[derive(Debug)]
@@ -49,6 +50,8 @@ pub struct Parts {
     pub limits: ArmLimits,
     /// What viewers want.
     pub demand: Arc<Demand>,
+    /// Where tools' bells are heard.
+    pub arms: Handle,
 }
 
 /// What the rest of the daemon holds of a session in the loop.
@@ -66,13 +69,16 @@ impl Simulation {
     /// # Errors
     /// The operating system's, when it has no descriptors left.
     pub fn build(parts: Parts) -> io::Result<(Box<Self>, Ends)> {
-        let Parts { session, model, timeline, drivers, arm, limits, demand } = parts;
+        let Parts { session, model, timeline, drivers, arm, limits, demand, arms } = parts;
         let (surface, surface_end) = exchange::surface(&model)?;
         let period_s = model.settings().tick_period_s;
         let mut tools = Vec::new();
         let mut tool_ends = Vec::new();
         for (index, driver) in drivers.into_iter().enumerate() {
-            let (port, end) = exchange::tool()?;
+            let (port, end) = {
+                let _of_arms = arms.enter();
+                exchange::tool()?
+            };
             let hand = arm.as_ref().filter(|hand| hand.tool == index);
             let arm = hand.map(|hand| BuiltinArm::new(hand.path.clone(), period_s)).transpose();
             let arm = arm.map_err(io::Error::other)?;
