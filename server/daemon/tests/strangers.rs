@@ -64,7 +64,7 @@ async fn call(channel: &Channel, path: &str, parts: Vec<Vec<u8>>, is_left_open: 
         .body(Body::new(StreamBody::new(parts.chain(end))))
         .unwrap();
     let mut channel = channel.clone();
-    let response = channel.ready().await.unwrap().call(request).await.unwrap();
+    let response = timeout(PATIENCE, channel.ready().await.unwrap().call(request)).await.expect("an answer").unwrap();
     let (head, body) = response.into_parts();
     if let Some(status) = tonic::Status::from_header_map(&head.headers) {
         return status;
