@@ -10,7 +10,7 @@ use palpate_scene::{Scene, ScriptedHand};
 use palpated::{
     serve::config::default_limits,
     sim::{
-        command::{Copy, Done, Orders, Request, desk},
+        command::{CAPACITY, Copy, Done, Orders, Refusal, Request, desk},
         exchange::DeviceInput,
         inject::Injection,
         simulation::{Ends, Parts, Simulation},
@@ -86,6 +86,32 @@ impl Running {
 
 fn copy_of(model: &Model) -> Request {
     Request::Copy(Box::new(Copy::of(model)))
+}
+
+/// Pause was refused in 14 of 86 tries while another client flooded the daemon with orders.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pause_goes_before_all_other_orders() {
+    let (simulation, _ends, model) = session(1, block_scene("block", 2), &Arc::default());
+    let running = Running::on(simulation);
+    let mut waiting = tokio::task::JoinSet::new();
+    for _ in 0..CAPACITY {
+        let (orders, request) = (running.orders.clone(), copy_of(&model));
+        waiting.spawn(async move { orders.give(1, request, true).await.unwrap().1 });
+    }
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    assert!(matches!(running.orders.give(1, copy_of(&model), true).await, Err(Refusal::Busy)), "no place is left");
+    // As many as there are, and more than may wait at a time.
+    let mut pauses = tokio::task::JoinSet::new();
+    for _ in 0..CAPACITY {
+        let orders = running.orders.clone();
+        pauses.spawn(async move { orders.give(1, Request::Pause(true), false).await.unwrap().1 });
+    }
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    running.begin();
+    let paused = pauses.join_all().await;
+    assert!(paused.iter().all(|done| done.paused && done.tick == 0), "the first tick is never begun: {paused:?}");
+    assert!(waiting.join_all().await.iter().all(|done| done.paused));
+    running.stop();
 }
 
 /// Sixty-four viewers that ask for the status at once cost one tick sixty-four copies of the state.

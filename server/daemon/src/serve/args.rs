@@ -3,7 +3,10 @@ use super::config::{ServeConfig, default_limits};
 use crate::doors::{bounds::Bounds, tls::TlsFiles};
 use clap::ValueEnum;
 use palpate_realtime::OsMeasures;
-use std::{net::SocketAddr, path::PathBuf};
+use std::{
+    net::{SocketAddr, ToSocketAddrs as _},
+    path::PathBuf,
+};
 
 /// What moves the tool while no device is attached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -20,8 +23,8 @@ pub struct ServeArgs {
     /// Scene file or name of a built-in scene
     #[arg(value_name = "SCENE", default_value = "heart")]
     pub scene: String,
-    /// Address and port for arms, viewers and the page; port 0 takes a free one
-    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7411")]
+    /// Address or name and port for arms, viewers and the page; port 0 takes a free one
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7411", value_parser = address)]
     pub listen: SocketAddr,
     /// Listen on this Unix socket as well
     #[arg(long, value_name = "PATH")]
@@ -67,6 +70,18 @@ pub struct ServeArgs {
     pub stay_awake: bool,
 }
 
+/// An address with a port, or a name of this machine with one.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    if let Ok(address) = text.parse() {
+        return Ok(address);
+    }
+    let form = "give an address of this machine and a port, such as 127.0.0.1:7411, 0.0.0.0:7411, [::1]:7411 or localhost:7411";
+    let mut found: Vec<SocketAddr> = text.to_socket_addrs().map_err(|error| format!("{error}: {form}"))?.collect();
+    // The page's address is easier to read so.
+    found.sort_by_key(SocketAddr::is_ipv6);
+    found.first().copied().ok_or_else(|| format!("no machine is known by this name: {form}"))
+}
+
 impl ServeArgs {
     /// The configuration, checked.
     ///
@@ -98,5 +113,23 @@ impl ServeArgs {
             measures,
         }
         .checked()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_and_names_are_listened_on() {
+        for (text, address_then) in
+            [("127.0.0.1:7411", "127.0.0.1:7411"), ("[::1]:1", "[::1]:1"), ("localhost:7411", "127.0.0.1:7411")]
+        {
+            assert_eq!(address(text).unwrap().to_string(), address_then);
+        }
+        for text in ["localhost", "7411", "", "127.0.0.1:70000", "localhost:"] {
+            let refusal = address(text).unwrap_err();
+            assert!(refusal.contains("0.0.0.0:7411"), "{text}: {refusal}");
+        }
     }
 }

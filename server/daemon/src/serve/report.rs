@@ -3,7 +3,10 @@ use super::{Running, ServeConfig, Summary};
 use crate::{bodies::served, sim::timing::STAGES};
 use palpate_realtime::Histogram;
 use palpate_scene::wording::counted;
-use std::fmt::Write as _;
+use std::{
+    fmt::Write as _,
+    net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr},
+};
 
 /// Lines for the start.
 pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> String {
@@ -49,8 +52,14 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
         let _ = writeln!(text, "warning    {warning}");
     }
     let scheme = if config.tls.is_some() { "https" } else { "http" };
-    let url = format!("{scheme}://{}", running.address);
+    let url = format!("{scheme}://{}", here(running.address));
     let _ = writeln!(text, "page       {url}/");
+    if running.address.ip().is_unspecified() {
+        let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
+        let port = running.address.port();
+        let _ =
+            writeln!(text, "elsewhere  {scheme}://{name}:{port}/ or an address of this machine, where others know it");
+    }
     let _ = writeln!(text, "arms       palpate-bridge --server {url}");
     let _ = writeln!(text, "viewers    palpate-view --server {url} status");
     if let Some(path) = &config.unix {
@@ -58,6 +67,15 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
     }
     let _ = write!(text, "stop       Ctrl-C (forces ramp to zero first)");
     text
+}
+
+/// The address as one of this machine reaches it: no address at all means every one.
+fn here(address: SocketAddr) -> SocketAddr {
+    match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => (Ipv4Addr::LOCALHOST, address.port()).into(),
+        IpAddr::V6(ip) if ip.is_unspecified() => (Ipv6Addr::LOCALHOST, address.port()).into(),
+        _ => address,
+    }
 }
 
 /// The table for the end.

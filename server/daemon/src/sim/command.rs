@@ -11,10 +11,15 @@ use palpate_realtime::Doorbell;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::{io, sync::Arc, time::Duration};
 use thiserror::Error;
-use tokio::sync::{Mutex, Semaphore, oneshot};
+use tokio::{
+    sync::{Mutex, Semaphore, oneshot},
+    time::timeout,
+};
 
 /// Orders that may wait or be worked on at a time.
 pub const CAPACITY: usize = 64;
+/// Orders to pause that are waiting or worked on.
+const PAUSES: usize = 16;
 /// An answer that takes longer means the loop is not running.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -136,6 +141,7 @@ pub struct Finished {
 /// The loop's end.
 #[derive(Debug)]
 pub struct Desk {
+    pauses: Consumer<Command>,
     orders: Consumer<Command>,
     finished: Producer<Finished>,
     // After `finished`: when the loop is gone, its last ring comes when the queue is seen to be abandoned.
@@ -154,9 +160,23 @@ impl Drop for RingAtEnd {
 /// The callers' end.
 #[derive(Debug, Clone)]
 pub struct Orders {
-    queue: Arc<Mutex<Producer<Command>>>,
-    /// One permit per order that is queued or worked on: neither queue can overflow.
+    pauses: Queue,
+    others: Queue,
+}
+
+/// A way to the loop.
+#[derive(Debug, Clone)]
+struct Queue {
+    producer: Arc<Mutex<Producer<Command>>>,
+    /// One permit per order that is queued or worked on: neither this queue nor that of finished ones can overflow.
     room: Arc<Semaphore>,
+}
+
+impl Queue {
+    fn of(places: usize) -> (Self, Consumer<Command>) {
+        let (producer, consumer) = RingBuffer::new(places);
+        (Self { producer: Arc::new(Mutex::new(producer)), room: Arc::new(Semaphore::new(places)) }, consumer)
+    }
 }
 
 /// The clerk's end.
@@ -172,14 +192,20 @@ pub struct Clerk {
 /// See [`bell`].
 pub fn desk() -> io::Result<(Desk, Orders, Clerk)> {
     let (bell, ear) = bell()?;
-    let (order_in, orders) = RingBuffer::new(CAPACITY);
-    let (finished_in, finished) = RingBuffer::new(CAPACITY);
-    let orders_end = Orders { queue: Arc::new(Mutex::new(order_in)), room: Arc::new(Semaphore::new(CAPACITY)) };
-    Ok((Desk { orders, finished: finished_in, bell: RingAtEnd(bell) }, orders_end, Clerk { finished, ear }))
+    let (others_in, orders) = Queue::of(CAPACITY);
+    let (pauses_in, pauses) = Queue::of(PAUSES);
+    let (finished_in, finished) = RingBuffer::new(CAPACITY + PAUSES);
+    let orders_end = Orders { pauses: pauses_in, others: others_in };
+    Ok((Desk { pauses, orders, finished: finished_in, bell: RingAtEnd(bell) }, orders_end, Clerk { finished, ear }))
 }
 
 impl Desk {
-    /// The next order.
+    /// The next order to pause. These go before all others: whoever wants time to stop does not stand in a queue.
+    pub fn next_pause(&mut self) -> Option<Command> {
+        self.pauses.pop().ok()
+    }
+
+    /// The next of the other orders.
     pub fn next_order(&mut self) -> Option<Command> {
         self.orders.pop().ok()
     }
@@ -211,15 +237,23 @@ impl Clerk {
 }
 
 impl Orders {
-    /// Gives an order to a session and waits for it to come back. Orders that take long (`patient`) are waited for without limit.
+    /// Gives an order to a session and waits for it to come back. Orders that take long (`patient`) are waited for without limit. An
+    /// order to pause has a queue of its own, and is not refused because others wait.
     ///
     /// # Errors
     /// [`Refusal`].
     pub async fn give(&self, session: u64, request: Request, patient: bool) -> Result<(Request, Done), Refusal> {
-        let permit = Arc::clone(&self.room).try_acquire_owned().map_err(|_| Refusal::Busy)?;
+        let is_pause = matches!(request, Request::Pause(true));
+        let Queue { producer, room } = if is_pause { &self.pauses } else { &self.others };
+        let permit = if is_pause {
+            let room = timeout(PATIENCE, Arc::clone(room).acquire_owned()).await;
+            room.map_err(|_| Refusal::Silent)?.map_err(|_| Refusal::Stopping)?
+        } else {
+            Arc::clone(room).try_acquire_owned().map_err(|_| Refusal::Busy)?
+        };
         let (reply, answer) = oneshot::channel();
         {
-            let mut queue = self.queue.lock().await;
+            let mut queue = producer.lock().await;
             if queue.is_abandoned() {
                 return Err(Refusal::Stopping);
             }
@@ -231,11 +265,8 @@ impl Orders {
             drop(permit);
             answer
         });
-        let answer = if patient {
-            waiting.await
-        } else {
-            tokio::time::timeout(PATIENCE, waiting).await.map_err(|_| Refusal::Silent)?
-        };
+        let answer =
+            if patient { waiting.await } else { timeout(PATIENCE, waiting).await.map_err(|_| Refusal::Silent)? };
         let answer = answer.map_err(|_| Refusal::Stopping)?.map_err(|_| Refusal::Stopping)?;
         answer.outcome.map(|done| (answer.request, done))
     }

@@ -164,8 +164,14 @@ impl Loop {
         }
     }
 
-    /// Orders are taken one after the other, one a tick: what follows one that waits, waits as well.
+    /// Orders are taken one after the other, one a tick: what follows one that waits, waits as well. A pause does not.
     fn take_an_order(&mut self) {
+        if let Some(mut command) = self.desk.next_pause() {
+            let is_of_this = command.session == self.simulation.session;
+            let outcome = if is_of_this { self.obey(&mut command.request) } else { Err(Refusal::OtherSession) };
+            self.desk.finish(command, outcome);
+            return;
+        }
         if let Some((command, since_ns)) = self.waiting.take() {
             self.obey_waiting(command, since_ns);
             return;
