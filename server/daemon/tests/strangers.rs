@@ -353,3 +353,15 @@ async fn a_page_of_others_is_not_answered() {
     assert!(page.contains("content-security-policy: default-src 'self'"), "{page}");
     daemon.finish().await;
 }
+
+/// Whoever has said nothing yet does not keep the daemon from stopping.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_silent_connection_does_not_delay_the_stop() {
+    let daemon = daemon_with(Bounds::default()).await;
+    let _silent = connect(&daemon).await;
+    let mut half = connect(&daemon).await;
+    half.write_all(b"PRI * HT").await.unwrap();
+    sleep(SHORT).await;
+    let summary = daemon.finish().await;
+    assert!(!summary.cut);
+}

@@ -28,8 +28,15 @@ use tower::ServiceExt as _;
 
 /// How long a socket is left alone when the operating system gives no further descriptor.
 const NO_DESCRIPTOR_PAUSE: Duration = Duration::from_millis(50);
-/// What is asked for after the doors have closed is refused; what is open then may end.
+/// How often connections are looked after, and how long one may take to end.
 const LOOK_AFTER: Duration = Duration::from_secs(1);
+
+/// Why something did not come to its end.
+#[derive(Debug, Clone, Copy)]
+enum Late {
+    TooLong,
+    Closing,
+}
 
 /// Receives connections of one socket.
 #[derive(Clone)]
@@ -85,14 +92,17 @@ impl Host {
 
     /// Looks who it is: an arm's connection goes to the arms' lane.
     async fn meet(&self, mut socket: Socket, peer: Peer, place: Place) {
-        let Ok(met) = timeout(self.bounds.first_request, lane::is_signed(&socket)).await else {
-            return self.refusals.count(Reason::Silent, Some(peer));
+        let met = match self.within(self.bounds.first_request, lane::is_signed(&socket)).await {
+            Ok(met) => met,
+            Err(late) => return self.refuse(late, Reason::Silent, peer),
         };
         match (met, &self.arms) {
             (Ok(false), _) => self.serve(socket, peer, &Arc::new(place)).await,
             (Ok(true), Some(arms)) => {
-                if !matches!(timeout(self.bounds.handshake, lane::read_sign(&mut socket)).await, Ok(Ok(()))) {
-                    return self.refusals.count(Reason::Handshake, Some(peer));
+                match self.within(self.bounds.handshake, lane::read_sign(&mut socket)).await {
+                    Ok(Ok(())) => {}
+                    Ok(Err(_)) => return self.refusals.count(Reason::Handshake, Some(peer)),
+                    Err(late) => return self.refuse(late, Reason::Handshake, peer),
                 }
                 // Its place among all others is free again.
                 drop(place);
@@ -109,31 +119,31 @@ impl Host {
 
     /// Serves a connection to its end.
     pub(super) async fn serve(&self, socket: Socket, peer: Peer, place: &Arc<Place>) {
-        match socket {
-            Socket::Tcp(stream) => match &self.tls {
-                None => self.attend(stream, peer, place).await,
-                Some(acceptor) => match timeout(self.bounds.handshake, acceptor.accept(stream)).await {
+        match (socket, &self.tls) {
+            (Socket::Tcp(stream), Some(acceptor)) => {
+                match self.within(self.bounds.handshake, acceptor.accept(stream)).await {
                     Ok(Ok(stream)) => self.attend(stream, peer, place).await,
-                    _ => self.refusals.count(Reason::Handshake, Some(peer)),
-                },
-            },
-            Socket::Unix(stream) => self.attend(stream, peer, place).await,
+                    Ok(Err(_)) => self.refusals.count(Reason::Handshake, Some(peer)),
+                    Err(late) => self.refuse(late, Reason::Handshake, peer),
+                }
+            }
+            (Socket::Tcp(stream), None) => self.attend(stream, peer, place).await,
+            (Socket::Unix(stream), _) => self.attend(stream, peer, place).await,
         }
     }
 
-    /// A peer that went away before it was accepted costs nothing. Without descriptors, whoever is idle gives one up, and the
-    /// socket is left alone for a while: it stays ready.
-    async fn not_accepted(&self, error: &io::Error) {
-        let of_system = error.raw_os_error().map(rustix::io::Errno::from_raw_os_error);
-        if !matches!(of_system, Some(rustix::io::Errno::MFILE | rustix::io::Errno::NFILE)) {
-            tracing::debug!(%error, "a connection was not accepted");
-            return;
+    /// What comes of something that may take so long, and not when the doors close.
+    async fn within<T>(&self, limit: Duration, something: impl Future<Output = T>) -> Result<T, Late> {
+        tokio::select! {
+            () = self.closing.cancelled() => Err(Late::Closing),
+            of_it = timeout(limit, something) => of_it.map_err(|_| Late::TooLong),
         }
-        self.refusals.count(Reason::NoDescriptor, None);
-        if self.crowd.evict() {
-            self.refusals.count(Reason::Evicted, None);
+    }
+
+    fn refuse(&self, late: Late, reason: Reason, peer: Peer) {
+        if matches!(late, Late::TooLong) {
+            self.refusals.count(reason, Some(peer));
         }
-        sleep(NO_DESCRIPTOR_PAUSE).await;
     }
 
     async fn attend<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
@@ -181,7 +191,13 @@ impl Host {
                 }
                 () = place.gone().cancelled() => return,
                 reason = overdue(place, &debts, self.bounds) => {
-                    return self.refusals.count(reason, Some(peer));
+                    self.refusals.count(reason, Some(peer));
+                    if reason == Reason::Idle {
+                        // A request that is on its way just now is made again by its client, who hears of the end.
+                        connection.as_mut().graceful_shutdown();
+                        let _ = timeout(LOOK_AFTER, connection).await;
+                    }
+                    return;
                 }
             }
         }
