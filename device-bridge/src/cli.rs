@@ -39,7 +39,7 @@ Examples:
   palpate-bridge emulate hapticmaster              an arm that is not there, to try a configuration
 
 Signals: SIGTERM or Ctrl-C ramps the force to zero, ends the stream and exits with 0; SIGUSR1 recovers from a latched fault.
-RUST_LOG=debug says more.";
+PALPATE_LOG=debug says more, PALPATE_LOG_FORMAT=json in lines of JSON.";
 
 /// Connects a haptic arm to a Palpate daemon.
 ///
@@ -279,16 +279,20 @@ fn say(text: &str) -> ExitCode {
     ExitCode::SUCCESS
 }
 
+/// Logs go to standard error, by the daemon's variables: `PALPATE_LOG` filters, `PALPATE_LOG_FORMAT=json` makes lines of JSON.
 fn start_logs() {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-    tracing_subscriber::fmt()
+    let filter = EnvFilter::try_from_env("PALPATE_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+    let logs = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .with_ansi(colours_wanted())
         // They would be told on standard error, and one of them is that it has no reader: a panic.
         .log_internal_errors(false)
-        .with_target(false)
-        .init();
+        .with_target(false);
+    match std::env::var("PALPATE_LOG_FORMAT").as_deref() {
+        Ok("json") => logs.json().flatten_event(true).init(),
+        _ => logs.init(),
+    }
 }
 
 /// Logs have colours on a terminal only, and not when `NO_COLOR` asks for none.

@@ -116,7 +116,7 @@ impl Bridge {
         let file = folder.path().join("bridge.toml");
         std::fs::write(&file, toml::to_string(config).unwrap()).unwrap();
         let mut program = Command::new(env!("CARGO_BIN_EXE_palpate-bridge"));
-        program.arg("--config").arg(&file).stdin(Stdio::null()).stdout(Stdio::null()).env("RUST_LOG", "error");
+        program.arg("--config").arg(&file).stdin(Stdio::null()).stdout(Stdio::null()).env("PALPATE_LOG", "error");
         Self { child: program.spawn().unwrap(), _folder: folder }
     }
 

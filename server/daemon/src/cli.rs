@@ -13,7 +13,8 @@ Examples:
   palpated static cantilever --out rest     find the equilibrium instead of integrating in time
   palpated schema > palpate-scene.json      JSON schema of scene files, for editors
 
-Scenes are TOML files (docs/scenes.md), or names of built-in ones: palpated check --list.";
+Scenes are TOML files (docs/scenes.md), or names of built-in ones: palpated check --list.
+Logs: PALPATE_LOG=debug says more, PALPATE_LOG_FORMAT=json writes lines of JSON.";
 
 /// Simulates soft bodies at the haptic rate: serves arms and viewers, or runs scenes offline.
 ///

@@ -10,6 +10,7 @@ mod progress;
 pub mod serve;
 pub mod session;
 pub mod sim;
+pub mod sparing;
 pub mod status;
 pub mod strained;
 pub mod stream;

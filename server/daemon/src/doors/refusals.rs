@@ -1,14 +1,10 @@
 //! Who was refused at the doors, counted by reason, and logged at most once a second for each.
+use crate::sparing::Sparing;
 use std::{
     fmt,
     net::SocketAddr,
-    sync::{
-        Mutex, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
-    time::Duration,
+    sync::atomic::{AtomicU64, Ordering},
 };
-use tokio::time::Instant;
 
 /// Who is at the other end of a connection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,14 +73,11 @@ pub const REASONS: [(Reason, &str, &str); 12] = [
     (Reason::Mute, "mute", "a connection was closed: nothing of its answer was taken for too long"),
 ];
 
-/// Between two lines of the log for one reason.
-const LOG_INTERVAL: Duration = Duration::from_secs(1);
-
 /// Counters by reason.
 #[derive(Debug, Default)]
 pub struct Refusals {
     counts: [AtomicU64; REASONS.len()],
-    logged: Mutex<[Option<Instant>; REASONS.len()]>,
+    logged: [Sparing; REASONS.len()],
 }
 
 impl Refusals {
@@ -92,17 +85,11 @@ impl Refusals {
     pub fn count(&self, reason: Reason, peer: Option<Peer>) {
         let Some(index) = REASONS.iter().position(|(other, ..)| *other == reason) else { return };
         let count = self.counts[index].fetch_add(1, Ordering::Relaxed) + 1;
-        let now = Instant::now();
-        {
-            let mut logged = self.logged.lock().unwrap_or_else(PoisonError::into_inner);
-            if logged[index].is_some_and(|then| now - then < LOG_INTERVAL) {
-                return;
-            }
-            logged[index] = Some(now);
-        }
-        let peer = peer.map(|peer| peer.to_string());
         let (_, name, meaning) = REASONS[index];
-        tracing::warn!(peer, reason = name, count, "{meaning}");
+        self.logged[index].say(|_| {
+            let peer = peer.map(|peer| peer.to_string());
+            tracing::warn!(peer, reason = name, count, "{meaning}");
+        });
     }
 
     /// How often, by now.

@@ -49,7 +49,7 @@ pub async fn routes(
         .max_decoding_message_size(MAX_SMALL_BYTES);
     let surface = SurfaceServer::new(surface::SurfaceService { daemon: Arc::clone(daemon) })
         .max_decoding_message_size(MAX_SMALL_BYTES);
-    let session = SessionServer::new(session::SessionService { daemon: Arc::clone(daemon) })
+    let session = SessionServer::new(session::SessionService { daemon: Arc::clone(daemon), said: Arc::default() })
         .max_decoding_message_size(MAX_SNAPSHOT_BYTES)
         .max_encoding_message_size(MAX_SNAPSHOT_BYTES);
     let (health, health_service) = tonic_health::server::health_reporter();

@@ -1,13 +1,14 @@
 //! `palpate.v1.Session`.
 use super::{convert, current_session};
 use crate::{
-    doors::answer::Kept,
+    doors::{answer::Kept, refusals::Peer},
     load,
     session::{ActiveSession, Daemon, prepare},
     sim::{
         command::{Copy, Done, Refusal, Request as Order},
         inject::InjectRefusal,
     },
+    sparing::Sparing,
     status,
 };
 use palpate_physics::snapshot;
@@ -24,6 +25,27 @@ use tonic::{Request, Response, Status};
 pub struct SessionService {
     /// Shared by all services.
     pub daemon: Arc<Daemon>,
+    /// Its lines of the log.
+    pub said: Arc<Said>,
+}
+
+/// A line of the log for each order that changes what an arm feels.
+#[derive(Debug, Default)]
+pub struct Said {
+    pause: Sparing,
+    go_on: Sparing,
+    reset: Sparing,
+    restore: Sparing,
+    step: Sparing,
+    inject: Sparing,
+}
+
+/// Says who gave an order; `times`: such orders since the last line.
+fn say<M>(line: &Sparing, request: &Request<M>, order: &'static str) {
+    line.say(|times| {
+        let peer = request.extensions().get::<Peer>().map(ToString::to_string);
+        tracing::info!(peer, order, times, "an order has come");
+    });
 }
 
 /// A refusal as gRPC tells it.
@@ -141,12 +163,16 @@ impl Session for SessionService {
     }
 
     async fn reset(&self, request: Request<v1::ResetRequest>) -> Result<Response<v1::ResetResponse>, Status> {
+        say(&self.said.reset, &request, "reset");
         let session = current_session(&self.daemon, &request.into_inner().session_id)?;
         let (_, done) = self.order(&session, Order::Reset).await?;
         Ok(Response::new(v1::ResetResponse { tick: done.tick }))
     }
 
     async fn pause(&self, request: Request<v1::PauseRequest>) -> Result<Response<v1::PauseResponse>, Status> {
+        let pauses = request.get_ref().paused;
+        let line = if pauses { &self.said.pause } else { &self.said.go_on };
+        say(line, &request, if pauses { "pause" } else { "go on" });
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let (_, done) = self.order(&session, Order::Pause(request.paused)).await?;
@@ -154,6 +180,7 @@ impl Session for SessionService {
     }
 
     async fn step(&self, request: Request<v1::StepRequest>) -> Result<Response<v1::StepResponse>, Status> {
+        say(&self.said.step, &request, "step");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let ticks = convert::step_ticks(request.ticks)?;
@@ -184,6 +211,7 @@ impl Session for SessionService {
     }
 
     async fn restore(&self, request: Request<v1::RestoreRequest>) -> Result<Response<v1::RestoreResponse>, Status> {
+        say(&self.said.restore, &request, "restore");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let (room, model) = (self.room().await?, Arc::clone(&session.model));
@@ -202,6 +230,7 @@ impl Session for SessionService {
         &self,
         request: Request<v1::InjectForcesRequest>,
     ) -> Result<Response<v1::InjectForcesResponse>, Status> {
+        say(&self.said.inject, &request, "inject forces");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let forces = convert::injections(&session, &request.forces)?;
