@@ -69,6 +69,28 @@ async fn tls_answers_those_who_trust_it_and_nobody_else() {
     assert!(missing.to_string().contains("key.pem"), "{missing}");
 }
 
+/// Health said SERVING while the body was quarantined, and no arm had force.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_quarantined_daemon_does_not_serve_arms() {
+    let daemon = Daemon::on(block_scene("health", 2)).await;
+    let mut health = HealthClient::new(daemon.channel.clone());
+    let mut until = async |service: &str, status: i32| {
+        let request = HealthCheckRequest { service: service.into() };
+        let mut watch = health.watch(request).await.unwrap().into_inner();
+        let is = async { while watch.message().await.unwrap().unwrap().status != status {} };
+        tokio::time::timeout(common::PATIENCE, is).await.unwrap_or_else(|_| panic!("{service} is never {status}"));
+    };
+    until("", 1).await;
+    daemon.break_the_body().await;
+    until("palpate.v1.Device", 2).await;
+    until("", 2).await;
+    until("palpate.v1.Session", 1).await;
+    daemon.reset().await;
+    until("palpate.v1.Device", 1).await;
+    until("", 1).await;
+    daemon.finish().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_busy_port_is_named_with_a_way_out() {
     let daemon = Daemon::on(block_scene("first", 2)).await;

@@ -5,6 +5,7 @@ pub mod error;
 pub mod report;
 mod run;
 mod start;
+mod watch;
 
 pub use config::ServeConfig;
 pub use error::ServeError;

@@ -136,6 +136,7 @@ pub async fn start_with(
     let gate = Gate::new(config.bounds, &daemon.refusals);
     let guard = Guard::new(&config.host_names, &daemon.refusals);
     let (routers, health) = grpc::routes(&daemon, gate, guard).await?;
+    tokio::spawn(super::watch::watch(Arc::clone(&daemon), health.clone()));
     let address = doors.address;
     let closing = CancellationToken::new();
     let servers = doors.serve(&routers, &lane.handle, config.bounds, &daemon.refusals, &closing);

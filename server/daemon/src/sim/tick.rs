@@ -36,6 +36,7 @@ impl Simulation {
         if plan.advance {
             timing.count(&self.advance());
         }
+        timing.note_quarantine(self.state.quarantine.map(|q| q.tick));
         let step_done_ns = clock.now_ns();
         self.couple(plan, begun_ns);
         let coupling_done_ns = clock.now_ns();

@@ -20,6 +20,8 @@ pub struct Timing {
     pub stages: [Histogram; 4],
     inputs_rejected: AtomicU64,
     repeated_ticks: AtomicU64,
+    /// Tick at which the state was quarantined, plus 1; 0: it is not.
+    quarantined: AtomicU64,
 }
 
 impl Timing {
@@ -29,10 +31,21 @@ impl Timing {
         self.repeated_ticks.fetch_add(u64::from(report.repeated > 0), Ordering::Relaxed);
     }
 
+    /// Notes whether the state is quarantined, and since which tick.
+    pub fn note_quarantine(&self, at_tick: Option<u64>) {
+        self.quarantined.store(at_tick.map_or(0, |tick| tick + 1), Ordering::Relaxed);
+    }
+
+    /// Tick at which the state was quarantined, if it is.
+    pub fn quarantined_at(&self) -> Option<u64> {
+        self.quarantined.load(Ordering::Relaxed).checked_sub(1)
+    }
+
     /// Inputs that the physics refused.
     pub fn inputs_rejected(&self) -> u64 {
         self.inputs_rejected.load(Ordering::Relaxed)
     }
+
     /// Ticks that proved unstable and were repeated in more substeps.
     pub fn repeated_ticks(&self) -> u64 {
         self.repeated_ticks.load(Ordering::Relaxed)
