@@ -85,10 +85,11 @@ export async function session(url, method, message) {
 }
 
 /** A headless browser that draws WebGL without a graphics card. */
-export const launch = (executablePath) =>
+export const launch = (executablePath, ...others) =>
   chromium.launch({
     executablePath,
     args: [
+      ...others,
       "--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
       "--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     ],

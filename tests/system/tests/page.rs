@@ -37,3 +37,8 @@ fn page_draws_the_surface_refined_near_tools_when_asked() {
 fn page_shows_active_particles_when_asked() {
     drive("particles.mjs", &[&root().join("deploy/scenes/hybrid-block.toml")]);
 }
+
+#[test]
+fn page_of_others_may_do_nothing() {
+    drive("strangers.mjs", &[]);
+}
