@@ -9,7 +9,6 @@ use crate::{
     vrpn_server,
 };
 use palpate_control::{EnergyMeter, Link, StiffnessBound};
-use palpate_realtime::os::Granted;
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
     path::PathBuf,
@@ -19,7 +18,10 @@ use std::{
     },
     time::{Duration, Instant},
 };
-use tokio::{sync::oneshot, task::JoinError, time};
+use tokio::{
+    sync::oneshot::{self, error::RecvError},
+    time,
+};
 use tokio_util::sync::CancellationToken;
 
 /// How far the priority of the stream is below the servo's.
@@ -124,8 +126,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let (commands, down) = slot(&None);
     let (up, samples) = slot(&None);
     let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
-    let source =
-        SampleSource::new(&bell, samples).map_err(|source| BridgeError::System { what: "watch an eventfd", source })?;
+    let heard = bell.clone();
     let guard = start_guard(&*device, &settings, shared.guard_program.get());
     let servo = Servo {
         law: ServoLaw::new(settings.servo),
@@ -143,12 +144,17 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     shared.unmeasured.store(settings.uplink.across_network.is_some(), Ordering::Relaxed);
     let _no_servo_alone = StopOnDrop(Arc::clone(&shared));
     let mut servo_done = start_servo(servo, &settings).await?;
-    let _granted = prefer_the_stream(settings.measures);
     let end = CancellationToken::new();
     let _no_stream_alone = end.clone().drop_guard();
     let server = server.map(|server| tokio::spawn(server.run(end.clone())));
-    let uplink = Uplink::new(settings.uplink.clone(), source, commands, Arc::clone(&shared), end.clone());
-    let mut uplink = tokio::spawn(uplink.run());
+    let uplink = {
+        let (settings, shared, end) = (settings.uplink.clone(), Arc::clone(&shared), end.clone());
+        move || {
+            let source = SampleSource::new(&heard, samples)?;
+            Ok(Uplink::new(settings, source, commands, shared, end))
+        }
+    };
+    let mut uplink = start_uplink(uplink, settings.measures)?;
     let mut watcher = Watcher::new(&settings);
     let mut every = time::interval(WATCH_PERIOD);
     let outcome = loop {
@@ -181,15 +187,35 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     }
 }
 
-/// Gives this thread, on which the stream to the daemon is, a priority right below the servo's: other programs of the machine do not
-/// delay it. Where that is refused, the servo has said so.
-fn prefer_the_stream(of_servo: OsMeasures) -> Option<Granted> {
-    let priority = of_servo.fifo_priority?.saturating_sub(BELOW_THE_SERVO).max(1);
-    let granted = OsMeasures { fifo_priority: Some(priority), ..OsMeasures::NONE }.apply();
-    for note in granted.notes.iter().filter(|note| note.granted) {
-        tracing::info!("stream to the daemon: {note}");
-    }
-    Some(granted)
+/// Starts the thread that the stream to the daemon is on, with a priority right below the servo's: other programs of the machine, and
+/// what else this one does, do not delay it. Where that is refused, the servo has said so. What comes back is how the stream ended.
+fn start_uplink(
+    make: impl FnOnce() -> std::io::Result<Uplink> + Send + 'static,
+    of_servo: OsMeasures,
+) -> Result<oneshot::Receiver<Result<(), BridgeError>>, BridgeError> {
+    let system = |source| BridgeError::System { what: "start the thread of the stream", source };
+    let fifo_priority = of_servo.fifo_priority.map(|priority| priority.saturating_sub(BELOW_THE_SERVO).max(1));
+    let measures = OsMeasures { fifo_priority, ..OsMeasures::NONE };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
+    let (tell, ended) = oneshot::channel();
+    let body = move || {
+        let granted = measures.apply();
+        for note in granted.notes.iter().filter(|note| note.granted) {
+            tracing::info!("stream to the daemon: {note}");
+        }
+        let run = async {
+            match make() {
+                Ok(uplink) => uplink.run().await,
+                Err(source) => Err(BridgeError::System { what: "watch an eventfd", source }),
+            }
+        };
+        let outcome = runtime.block_on(run);
+        // A name that is being looked up is not waited for.
+        runtime.shutdown_background();
+        let _ = tell.send(outcome);
+    };
+    std::thread::Builder::new().name("palpate-stream".to_owned()).spawn(body).map_err(system)?;
+    Ok(ended)
 }
 
 /// A guard, where it can help; without one the arm's own patience is all there is, which is said.
@@ -237,7 +263,7 @@ impl Drop for StopOnDrop {
 /// Why a bridge stops.
 enum Outcome {
     Asked,
-    UplinkEnded(Result<Result<(), BridgeError>, JoinError>),
+    UplinkEnded(Result<Result<(), BridgeError>, RecvError>),
     ServoDied,
 }
 

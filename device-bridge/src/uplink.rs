@@ -179,7 +179,10 @@ impl Uplink {
     /// One connection, with an arm's sign first. What stands between, and daemons of before, may know nothing of it: then without.
     async fn connection(&mut self) -> Ended {
         match self.connection_signed(true).await {
-            Ended::Misunderstood(_) if !self.end.is_cancelled() => self.connection_signed(false).await,
+            Ended::Misunderstood(reason) if !self.end.is_cancelled() => {
+                tracing::debug!("an arm's sign was not understood ({reason}): trying without");
+                self.connection_signed(false).await
+            }
             ended => ended,
         }
     }
@@ -214,7 +217,7 @@ impl Uplink {
             attached = tokio::time::timeout(ANSWER_TIMEOUT, attach) => attached,
         };
         match attached {
-            Err(_) => Ended::Misunderstood(format!("it sent no welcome within {ANSWER_TIMEOUT:?}")),
+            Err(_) => Ended::Unreachable(format!("it sent no welcome within {ANSWER_TIMEOUT:?}")),
             Ok(Err(status)) if is_transport(&status) => Ended::Misunderstood(why_no_answer(&status)),
             // What stands before a daemon that is down says so in these.
             Ok(Err(status)) if matches!(status.code(), Code::Unavailable | Code::Unknown) => {
@@ -222,7 +225,15 @@ impl Uplink {
             }
             Ok(Err(status)) => Ended::Refused(status),
             Ok(Ok((down, first))) => match welcome_of(first) {
-                Ok(welcome) => self.attached(down, &welcome).await,
+                Ok(welcome) => {
+                    if !is_signed {
+                        tracing::warn!(
+                            "what answers at {} does not know an arm's sign: its viewers may delay the force",
+                            self.settings.address
+                        );
+                    }
+                    self.attached(down, &welcome).await
+                }
                 Err(reason) => Ended::Refused(Status::failed_precondition(reason)),
             },
         }

@@ -288,6 +288,11 @@ pub fn prepare(
 }
 
 impl Daemon {
+    /// How many states requests may still hold beside the running one.
+    pub fn room_for_states_left(&self) -> usize {
+        self.room_for_states.available_permits()
+    }
+
     /// The running session.
     pub fn session(&self) -> Arc<ActiveSession> {
         Arc::clone(&self.current.read().unwrap_or_else(PoisonError::into_inner))

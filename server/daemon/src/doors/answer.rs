@@ -1,5 +1,5 @@
 //! Answers on their way: as long as one is, its connection is in use; what its peer does not take is a debt with a date.
-use super::crowd::Place;
+use super::{bounds::SEND_BUFFER_BYTES, crowd::Place};
 use axum::body::{Body, Bytes, HttpBody};
 use http_body::{Frame, SizeHint};
 use std::{
@@ -38,6 +38,8 @@ pub(super) struct Answer {
     debts: Arc<Debts>,
     number: u64,
     body: Body,
+    /// Of a part of the body, what has not been handed on.
+    rest: Bytes,
     kept: Vec<Kept>,
 }
 
@@ -59,7 +61,14 @@ impl Answer {
     pub(super) fn begin(place: &Arc<Place>, debts: &Arc<Debts>) -> Self {
         place.begin();
         let number = debts.next.fetch_add(1, Ordering::Relaxed);
-        Self { place: Arc::clone(place), debts: Arc::clone(debts), number, body: Body::empty(), kept: Vec::new() }
+        Self {
+            place: Arc::clone(place),
+            debts: Arc::clone(debts),
+            number,
+            body: Body::empty(),
+            rest: Bytes::new(),
+            kept: Vec::new(),
+        }
     }
 
     /// It keeps this until its end.
@@ -85,8 +94,43 @@ impl HttpBody for Answer {
     type Data = Bytes;
     type Error = axum::Error;
 
-    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        let polled = Pin::new(&mut self.body).poll_frame(cx);
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Polled {
+        // A transport that has taken a part holds all of it: parts are small, so that what is not taken is seen to be here.
+        if self.rest.is_empty() {
+            match Pin::new(&mut self.body).poll_frame(cx) {
+                Poll::Ready(Some(Ok(frame))) => match frame.into_data() {
+                    Ok(data) if data.len() > SEND_BUFFER_BYTES => self.rest = data,
+                    Ok(data) => return self.noted(Poll::Ready(Some(Ok(Frame::data(data))))),
+                    Err(trailers) => return self.noted(Poll::Ready(Some(Ok(trailers)))),
+                },
+                polled => return self.noted(polled),
+            }
+        }
+        let part = SEND_BUFFER_BYTES.min(self.rest.len());
+        let part = self.rest.split_to(part);
+        self.noted(Poll::Ready(Some(Ok(Frame::data(part)))))
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.rest.is_empty() && self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        let (of_body, rest) = (self.body.size_hint(), self.rest.len() as u64);
+        let mut hint = SizeHint::new();
+        if let Some(upper) = of_body.upper() {
+            hint.set_upper(upper + rest);
+        }
+        hint.set_lower(of_body.lower() + rest);
+        hint
+    }
+}
+
+type Polled = Poll<Option<Result<Frame<Bytes>, axum::Error>>>;
+
+impl Answer {
+    /// Notes when a part was handed on, or that none is there.
+    fn noted(&self, polled: Polled) -> Polled {
         let mut debts = self.debts.lock();
         match &polled {
             Poll::Ready(Some(Ok(_))) => debts.insert(self.number, Instant::now()),
@@ -94,13 +138,5 @@ impl HttpBody for Answer {
         };
         drop(debts);
         polled
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.body.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.body.size_hint()
     }
 }

@@ -7,7 +7,9 @@ use std::time::Duration;
 pub struct Bounds {
     /// Connections at a time, over all sockets. One more takes the place of the oldest that has asked for nothing yet.
     pub connections: usize,
-    /// Requests at a time, streams of viewers among them, those of devices apart.
+    /// Streams of viewers, of health and of reflection at a time.
+    pub streams: usize,
+    /// Other requests at a time: those of Session, and as many of all else.
     pub requests: usize,
     /// Streams of devices at a time, those that have not said hello yet among them.
     pub attachments: usize,
@@ -19,7 +21,7 @@ pub struct Bounds {
     pub idle: Duration,
     /// How long a peer may leave a part of an answer that is there for it.
     pub mute: Duration,
-    /// How long headers of HTTP/1.1 may take.
+    /// How long headers of HTTP/1.1 may take, from the end of the request before: a connection that is kept open waits no longer.
     pub headers: Duration,
     /// How long a request may be without a further byte.
     pub stall: Duration,
@@ -31,7 +33,8 @@ impl Default for Bounds {
     fn default() -> Self {
         Self {
             connections: 4096,
-            requests: 2048,
+            streams: 1536,
+            requests: 256,
             attachments: 64,
             handshake: Duration::from_secs(5),
             first_request: Duration::from_secs(10),
@@ -50,7 +53,11 @@ pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Streams on one connection at a time.
 pub const STREAMS: u32 = 256;
-/// Bytes of an answer that a stream holds for a peer that does not read, beside the message that is being sent.
+/// Streams on a connection of an arm, which needs one.
+pub const STREAMS_OF_ARM: u32 = 2;
+/// Bytes that a connection of HTTP/1.1 reads ahead, and holds of its answer.
+pub const HTTP1_BUFFER_BYTES: usize = 32 * 1024;
+/// Bytes of an answer that a stream hands to the transport for a peer that does not read; and the largest part that it is cut into.
 pub const SEND_BUFFER_BYTES: usize = 16 * 1024;
 /// Bytes of a request's headers.
 pub const HEADER_LIST_BYTES: u32 = 16 * 1024;

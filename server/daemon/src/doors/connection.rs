@@ -9,7 +9,7 @@ use super::{
     whole::{self, ATTACH},
 };
 use axum::{Router, body::Body};
-use hyper::{Request, body::Incoming, service::service_fn};
+use hyper::{HeaderMap, Request, Response, StatusCode, body::Incoming, service::service_fn};
 use hyper_util::{
     rt::{TokioExecutor, TokioIo, TokioTimer},
     server::conn::auto,
@@ -31,6 +31,47 @@ const NO_DESCRIPTOR_PAUSE: Duration = Duration::from_millis(50);
 /// How often connections are looked after, and how long one may take to end.
 const LOOK_AFTER: Duration = Duration::from_secs(1);
 
+/// Room for requests that are being answered.
+#[derive(Debug, Clone)]
+pub(super) struct Rooms {
+    attachments: Arc<Semaphore>,
+    streams: Arc<Semaphore>,
+    orders: Arc<Semaphore>,
+    others: Arc<Semaphore>,
+}
+
+impl Rooms {
+    pub(super) fn new(bounds: &Bounds) -> Self {
+        let of = |requests| Arc::new(Semaphore::new(requests));
+        Self {
+            attachments: of(bounds.attachments),
+            streams: of(bounds.streams),
+            orders: of(bounds.requests),
+            others: of(bounds.requests),
+        }
+    }
+
+    fn of(&self, path: &str) -> &Arc<Semaphore> {
+        match path {
+            ATTACH => &self.attachments,
+            _ if path.ends_with("/Watch") || path.starts_with("/grpc.reflection.") => &self.streams,
+            _ if path.starts_with("/palpate.v1.Session/") => &self.orders,
+            _ => &self.others,
+        }
+    }
+}
+
+/// The answer when there is no room.
+fn busy(asked: &HeaderMap) -> Response<Body> {
+    let text = "too many requests are being answered: try again later";
+    if whole::is_grpc(asked) {
+        return whole::refused(&Status::resource_exhausted(text), asked);
+    }
+    let mut response = Response::new(Body::from(format!("{text}\n")));
+    *response.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
+    response
+}
+
 /// Why something did not come to its end.
 #[derive(Debug, Clone, Copy)]
 enum Late {
@@ -43,8 +84,7 @@ enum Late {
 pub(super) struct Host {
     pub(super) router: Router,
     pub(super) bounds: Bounds,
-    pub(super) requests: Arc<Semaphore>,
-    pub(super) attachments: Arc<Semaphore>,
+    pub(super) rooms: Rooms,
     /// Where arms' connections are served.
     pub(super) arms: Option<Arc<Arms>>,
     pub(super) tls: Option<TlsAcceptor>,
@@ -146,6 +186,22 @@ impl Host {
         }
     }
 
+    /// A peer that went away before it was accepted costs nothing. Without descriptors or memory, whoever is idle gives some up, and the
+    /// socket is left alone for a while: it stays ready.
+    async fn not_accepted(&self, error: &io::Error) {
+        use rustix::io::Errno;
+        let of_system = error.raw_os_error().map(Errno::from_raw_os_error);
+        if !matches!(of_system, Some(Errno::MFILE | Errno::NFILE | Errno::NOBUFS | Errno::NOMEM)) {
+            tracing::debug!(%error, "a connection was not accepted");
+            return;
+        }
+        self.refusals.count(Reason::NoDescriptor, None);
+        if self.crowd.evict() {
+            self.refusals.count(Reason::Evicted, None);
+        }
+        sleep(NO_DESCRIPTOR_PAUSE).await;
+    }
+
     async fn attend<S: AsyncRead + AsyncWrite + Unpin + Send + 'static>(
         &self,
         stream: S,
@@ -160,11 +216,7 @@ impl Host {
             let room = self.room(request.uri().path(), peer);
             async move {
                 let Some(room) = room else {
-                    let busy = whole::refused(
-                        &Status::resource_exhausted("too many requests: try again later"),
-                        request.headers(),
-                    );
-                    return Ok(busy.map(|body| answer.is(body)));
+                    return Ok(busy(request.headers()).map(|body| answer.is(body)));
                 };
                 answer.keep(room);
                 let Ok(mut response) = router.oneshot(request.map(Body::new)).await;
@@ -203,10 +255,9 @@ impl Host {
         }
     }
 
-    /// Room for one more request of its kind. Devices have their own: viewers cannot take it.
+    /// Room for one more request of its kind: none can take that of another.
     fn room(&self, path: &str, peer: Peer) -> Option<Kept> {
-        let of = if path == ATTACH { &self.attachments } else { &self.requests };
-        let permit = Arc::clone(of).try_acquire_owned();
+        let permit = Arc::clone(self.rooms.of(path)).try_acquire_owned();
         permit.map(Kept::new).inspect_err(|_| self.refusals.count(Reason::Busy, Some(peer))).ok()
     }
 
@@ -217,13 +268,17 @@ impl Host {
             .timer(TokioTimer::new())
             .keep_alive_interval(Some(bounds::KEEPALIVE_INTERVAL))
             .keep_alive_timeout(bounds::KEEPALIVE_TIMEOUT)
-            .max_concurrent_streams(bounds::STREAMS)
+            .max_concurrent_streams(if self.arms.is_some() { bounds::STREAMS } else { bounds::STREAMS_OF_ARM })
             .max_send_buf_size(bounds::SEND_BUFFER_BYTES)
             .max_header_list_size(bounds::HEADER_LIST_BYTES)
             .initial_stream_window_size(bounds::STREAM_WINDOW_BYTES)
             .initial_connection_window_size(bounds::CONNECTION_WINDOW_BYTES);
         // The page speaks HTTP/1.1 where there is no TLS.
-        server.http1().timer(TokioTimer::new()).header_read_timeout(self.bounds.headers);
+        let http1 = &mut server.http1();
+        http1
+            .timer(TokioTimer::new())
+            .header_read_timeout(self.bounds.headers)
+            .max_buf_size(bounds::HTTP1_BUFFER_BYTES);
         server
     }
 }

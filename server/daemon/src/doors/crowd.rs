@@ -43,26 +43,32 @@ impl Crowd {
 
     /// A place, and whether an idle connection has to leave for it; `None` when all are taken by such as are in use.
     pub fn enter(self: &Arc<Self>) -> Option<(Place, bool)> {
-        let is_full = self.count() >= self.most;
-        if is_full && !self.evict() {
-            return None;
-        }
-        let place = Place {
-            crowd: Arc::clone(self),
-            gone: CancellationToken::new(),
-            streams: Mutex::new(Streams { in_flight: 0, has_asked: false, idle: None, since: Instant::now() }),
+        let (gone, number) = (CancellationToken::new(), self.next.fetch_add(1, Ordering::Relaxed));
+        let is_full = {
+            let mut state = self.lock();
+            let is_full = state.places >= self.most;
+            if is_full && !state.evict() {
+                return None;
+            }
+            state.places += 1;
+            state.idle.insert(number, gone.clone());
+            is_full
         };
-        self.lock().places += 1;
-        place.becomes_idle(&mut place.lock());
-        Some((place, is_full))
+        let streams = Streams { in_flight: 0, has_asked: false, idle: Some(number), since: Instant::now() };
+        Some((Place { crowd: Arc::clone(self), gone, streams: Mutex::new(streams) }, is_full))
     }
 
     /// Sends the connection away that has been idle for longest; whether there was one. Its place is free at once.
     pub fn evict(&self) -> bool {
-        let mut state = self.lock();
-        let Some((_, gone)) = state.idle.pop_first() else { return false };
+        self.lock().evict()
+    }
+}
+
+impl State {
+    fn evict(&mut self) -> bool {
+        let Some((_, gone)) = self.idle.pop_first() else { return false };
         gone.cancel();
-        state.places -= 1;
+        self.places -= 1;
         true
     }
 }
@@ -118,7 +124,11 @@ impl Place {
         let number = self.crowd.next.fetch_add(1, Ordering::Relaxed);
         streams.idle = Some(number);
         streams.since = Instant::now();
-        self.crowd.lock().idle.insert(number, self.gone.clone());
+        let mut state = self.crowd.lock();
+        // One that has been sent away while a request began has no place to give up a second time.
+        if !self.gone.is_cancelled() {
+            state.idle.insert(number, self.gone.clone());
+        }
     }
 
     /// Whether there ever was a request.

@@ -16,14 +16,14 @@ pub mod whole;
 
 use axum::Router;
 use bounds::Bounds;
-use connection::Host;
+use connection::{Host, Rooms};
 use crowd::Crowd;
 use lane::Arms;
 use listen::{ListenError, Listener};
 use refusals::Refusals;
 use std::{net::SocketAddr, path::Path, sync::Arc};
 use tls::TlsFiles;
-use tokio::{runtime::Handle, sync::Semaphore, task::JoinSet};
+use tokio::{runtime::Handle, task::JoinSet};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
@@ -71,15 +71,13 @@ impl Doors {
     ) -> JoinSet<()> {
         let mut servers = JoinSet::new();
         let crowd = Crowd::of(bounds.connections);
-        let requests = Arc::new(Semaphore::new(bounds.requests));
-        let attachments = Arc::new(Semaphore::new(bounds.attachments));
+        let rooms = Rooms::new(&bounds);
         let arms_crowd = Crowd::of(bounds.attachments);
         let host = |router: &Router, crowd: &Arc<Crowd>, arms, tls| Host {
             router: router.clone(),
             arms,
             bounds,
-            requests: Arc::clone(&requests),
-            attachments: Arc::clone(&attachments),
+            rooms: rooms.clone(),
             tls,
             crowd: Arc::clone(crowd),
             refusals: Arc::clone(refusals),

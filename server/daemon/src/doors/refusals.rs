@@ -45,6 +45,8 @@ pub enum Reason {
     Foreign,
     /// A message is larger than its method's may be.
     TooLarge,
+    /// A request is not one whole message.
+    Broken,
     /// A request did not come to its end in time.
     TooSlow,
     /// All requests together hold as much as they may.
@@ -54,7 +56,7 @@ pub enum Reason {
 }
 
 /// Every reason, with its name in counters and what it means to whoever reads the log.
-pub const REASONS: [(Reason, &str, &str); 12] = [
+pub const REASONS: [(Reason, &str, &str); 13] = [
     (
         Reason::NoDescriptor,
         "no_descriptor",
@@ -68,6 +70,7 @@ pub const REASONS: [(Reason, &str, &str); 12] = [
     (Reason::Idle, "idle", "a connection was closed, as it had asked for nothing any more"),
     (Reason::Foreign, "foreign", "a request was refused: it came from a web page of others, or is no call of gRPC"),
     (Reason::TooLarge, "too_large", "a request was refused: its message is too large"),
+    (Reason::Broken, "broken", "a request was refused: it is not one whole message"),
     (Reason::TooSlow, "too_slow", "a request was refused: it did not come to its end in time"),
     (Reason::NoRoom, "no_room", "a request was refused: others hold as much memory as all may"),
     (Reason::Mute, "mute", "a connection was closed: nothing of its answer was taken for too long"),

@@ -26,6 +26,8 @@ const PREFIX_BYTES: usize = 5;
 const BESIDE_BYTES: usize = 1024;
 /// The stream of a device.
 pub(super) const ATTACH: &str = "/palpate.v1.Device/Attach";
+/// What begins trailers of gRPC-web, in a message's place.
+const TRAILERS: u8 = 0x80;
 /// A permit of [`Gate::room`] is for so many bytes.
 const PERMIT_BYTES: usize = 64 * 1024;
 
@@ -63,9 +65,10 @@ pub async fn take(State(gate): State<Gate>, request: Request, next: Next) -> Res
     }
 }
 
-/// Whether a request is of gRPC or gRPC-web.
+/// Whether a request is of gRPC, or of gRPC-web in bytes; in text it is not spoken.
 pub fn is_grpc(headers: &HeaderMap) -> bool {
-    headers.get(CONTENT_TYPE).is_some_and(|of| of.as_bytes().starts_with(b"application/grpc"))
+    let kind = headers.get(CONTENT_TYPE).map(HeaderValue::as_bytes).unwrap_or_default();
+    kind.starts_with(b"application/grpc") && !kind.starts_with(b"application/grpc-web-text")
 }
 
 fn is_streamed(path: &str) -> bool {
@@ -112,6 +115,12 @@ impl Gate {
             }
             bytes.extend_from_slice(data);
         }
+        if !is_one_message(&bytes) {
+            return Err((
+                Some(Reason::Broken),
+                Status::invalid_argument("the request is not one message, whole and alone"),
+            ));
+        }
         Ok((bytes.freeze(), held))
     }
 
@@ -145,6 +154,38 @@ fn announced(before: &[u8], data: &[u8]) -> Option<usize> {
     Some(u32::from_be_bytes([byte()?, byte()?, byte()?, byte()?]) as usize)
 }
 
+/// Whether a request's bytes are a message with its prefix, and no more but what gRPC-web may put behind it. gRPC's decoder would take
+/// another's announcement for true.
+fn is_one_message(bytes: &[u8]) -> bool {
+    let end = |from: usize| Some(from + PREFIX_BYTES + announced(&[], bytes.get(from..)?)?);
+    match end(0) {
+        // None at all is told by the service itself.
+        None => bytes.is_empty(),
+        Some(first) if first == bytes.len() => true,
+        Some(first) => bytes.get(first) == Some(&TRAILERS) && end(first) == Some(bytes.len()),
+    }
+}
+
 fn too_large(bytes: usize, most: usize) -> Status {
     Status::out_of_range(format!("the request's message has {bytes} bytes or more; its method takes at most {most}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_is_one_message_whole_and_alone() {
+        let message = [0, 0, 0, 0, 2, 7, 7];
+        let trailers = [0x80, 0, 0, 0, 1, 9];
+        assert!(is_one_message(&[]) && is_one_message(&message) && is_one_message(&[0; 5]));
+        assert!(is_one_message(&[&message[..], &trailers].concat()));
+        for broken in [&message[..6], &message[..3], &[&message[..], &[0]].concat(), &[&message[..], &message].concat()]
+        {
+            assert!(!is_one_message(broken), "{broken:?}");
+        }
+        // 10 bytes that would have the decoder reserve 64 MiB.
+        assert!(!is_one_message(&[0, 0, 0, 0, 0, 0, 4, 0, 0, 0]));
+        assert!(!is_one_message(&[&message[..], &trailers[..5]].concat()));
+    }
 }

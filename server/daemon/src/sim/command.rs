@@ -18,8 +18,8 @@ use tokio::{
 
 /// Orders that may wait or be worked on at a time.
 pub const CAPACITY: usize = 64;
-/// Orders to pause that are waiting or worked on.
-const PAUSES: usize = 16;
+/// Orders to pause or to go on that are waiting or worked on.
+pub(super) const PAUSES: usize = 16;
 /// An answer that takes longer means the loop is not running.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -200,7 +200,7 @@ pub fn desk() -> io::Result<(Desk, Orders, Clerk)> {
 }
 
 impl Desk {
-    /// The next order to pause. These go before all others: whoever wants time to stop does not stand in a queue.
+    /// The next order to pause or to go on. These go before all others: whoever wants time to stop does not stand in a queue.
     pub fn next_pause(&mut self) -> Option<Command> {
         self.pauses.pop().ok()
     }
@@ -243,7 +243,7 @@ impl Orders {
     /// # Errors
     /// [`Refusal`].
     pub async fn give(&self, session: u64, request: Request, patient: bool) -> Result<(Request, Done), Refusal> {
-        let is_pause = matches!(request, Request::Pause(true));
+        let is_pause = matches!(request, Request::Pause(_));
         let Queue { producer, room } = if is_pause { &self.pauses } else { &self.others };
         let permit = if is_pause {
             let room = timeout(PATIENCE, Arc::clone(room).acquire_owned()).await;

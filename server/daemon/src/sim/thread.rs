@@ -1,6 +1,6 @@
 //! The loop: a thread of its own that wakes at absolute deadlines, takes orders, and ticks.
 use super::{
-    command::{Command, Copy, Desk, Done, Refusal, Request},
+    command::{Command, Copy, Desk, Done, PAUSES, Refusal, Request},
     simulation::Simulation,
     tick::Plan,
     timing::Timing,
@@ -164,13 +164,14 @@ impl Loop {
         }
     }
 
-    /// Orders are taken one after the other, one a tick: what follows one that waits, waits as well. A pause does not.
+    /// Orders are taken one after the other, one a tick: what follows one that waits, waits as well. Orders to pause or go on do not.
     fn take_an_order(&mut self) {
-        if let Some(mut command) = self.desk.next_pause() {
+        // They cost nothing, so all that are there are taken: many of them delay no other order.
+        for _ in 0..PAUSES {
+            let Some(mut command) = self.desk.next_pause() else { break };
             let is_of_this = command.session == self.simulation.session;
             let outcome = if is_of_this { self.obey(&mut command.request) } else { Err(Refusal::OtherSession) };
             self.desk.finish(command, outcome);
-            return;
         }
         if let Some((command, since_ns)) = self.waiting.take() {
             self.obey_waiting(command, since_ns);
