@@ -228,7 +228,7 @@ impl Host {
         });
         let server = self.protocol();
         let mut connection = pin!(server.serve_connection(TokioIo::new(stream), service));
-        let mut is_closing = false;
+        let (mut is_closing, mut bounds) = (false, self.bounds);
         loop {
             tokio::select! {
                 ended = &mut connection => {
@@ -242,14 +242,18 @@ impl Host {
                     connection.as_mut().graceful_shutdown();
                 }
                 () = place.gone().cancelled() => return,
-                reason = overdue(place, &debts, self.bounds) => {
-                    self.refusals.count(reason, Some(peer));
-                    if reason == Reason::Idle {
-                        // A request that is on its way just now is made again by its client, who hears of the end.
-                        connection.as_mut().graceful_shutdown();
-                        let _ = timeout(LOOK_AFTER, connection).await;
+                reason = overdue(place, &debts, bounds) => {
+                    if is_closing {
+                        return;
                     }
-                    return;
+                    self.refusals.count(reason, Some(peer));
+                    if reason != Reason::Idle {
+                        return;
+                    }
+                    // Its peer is told, and has time to hear it; what is on its way just now is answered.
+                    is_closing = true;
+                    bounds.idle += LOOK_AFTER;
+                    connection.as_mut().graceful_shutdown();
                 }
             }
         }
