@@ -50,7 +50,7 @@ impl Guard {
     /// What is wrong with a request, in words for its sender.
     fn fault(&self, uri: &Uri, headers: &HeaderMap) -> Option<(StatusCode, String)> {
         let origin = headers.get(ORIGIN);
-        let is_call = uri.path().starts_with("/palpate.v1.") || uri.path().starts_with("/grpc.");
+        let is_call = is_call(uri.path());
         if is_call && !is_grpc(headers) {
             let text = "a call of a service has the content type application/grpc, or application/grpc-web";
             return Some((StatusCode::UNSUPPORTED_MEDIA_TYPE, text.to_owned()));
@@ -73,6 +73,12 @@ impl Guard {
         }
         None
     }
+}
+
+/// Whether a path is of a service's method, such as `/palpate.v1.Session/Pause`; the page has files whose names begin so.
+fn is_call(path: &str) -> bool {
+    let service = path.trim_start_matches('/').split_once('/').map_or("", |(service, _)| service);
+    service.starts_with("palpate.v1.") || service.starts_with("grpc.")
 }
 
 /// Whether an origin, such as `http://localhost:7411`, is this host.
@@ -135,6 +141,9 @@ mod tests {
         }
         for host in ["evil.example:7411", "localhost.evil.example", "127.0.0.1.evil.example", "heart.example.org"] {
             assert_eq!(answer("/", &[("host", host)]), 421, "{host}");
+        }
+        for file in ["/palpate.v1.binpb", "/assets/palpate.js"] {
+            assert_eq!(answer(file, &[("host", "localhost")]), 200, "{file}");
         }
         assert_eq!(answer("/", &[]), 400);
         assert_eq!(answer("http://evil.example/", &[]), 421, "as HTTP/2 says it");
