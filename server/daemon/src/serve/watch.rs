@@ -27,11 +27,10 @@ pub(super) async fn watch(daemon: Arc<Daemon>, health: HealthReporter) {
         let now = daemon.timing.quarantined_at();
         if now != quarantined {
             quarantined = now;
-            match now {
-                Some(tick) => {
-                    tracing::error!(tick, "the body is quarantined: arms get no force until Reset or Restore")
-                }
-                None => tracing::info!("the body is no longer quarantined"),
+            if let Some(tick) = now {
+                tracing::error!(tick, "the body is quarantined: arms get no force until Reset or Restore");
+            } else {
+                tracing::info!("the body is no longer quarantined");
             }
             let status = if now.is_some() { ServingStatus::NotServing } else { ServingStatus::Serving };
             for service in [Device::NAME, ""] {
