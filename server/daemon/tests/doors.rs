@@ -72,7 +72,7 @@ async fn tls_answers_those_who_trust_it_and_nobody_else() {
 /// Health said SERVING while the body was quarantined, and no arm had force.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_quarantined_daemon_does_not_serve_arms() {
-    let daemon = Daemon::on(block_scene("health", 2)).await;
+    let daemon = Daemon::on(block_scene("health", 4)).await;
     let mut health = HealthClient::new(daemon.channel.clone());
     let mut until = async |service: &str, status: i32| {
         let request = HealthCheckRequest { service: service.into() };

@@ -1,7 +1,7 @@
 // Pages of others in a real browser: none of them may pause the daemon, read from it, or show its page.
 // Usage: node strangers.mjs PALPATED ARTEFACTS [CHROMIUM]
 import { createServer } from "node:http";
-import { check, freePort, launch, startDaemon, stopDaemon } from "./common.mjs";
+import { check, drawn, freePort, launch, startDaemon, stopDaemon } from "./common.mjs";
 
 const [palpated, , executablePath = "/usr/bin/chromium"] = process.argv.slice(2);
 const [port, othersPort] = [await freePort(), await freePort()];
@@ -32,7 +32,10 @@ try {
   await own.goto(url);
   await own.waitForSelector('#connection[data-state="live"]', { timeout: 20_000 });
   const stands = async () => {
+    // A page behind another draws nothing.
+    await own.bringToFront();
     await own.waitForTimeout(500);
+    await drawn(own);
     return (await own.textContent("#time")).includes("stands");
   };
 
