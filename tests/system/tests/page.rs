@@ -1,7 +1,14 @@
 //! The page in a real browser: headless Chromium, driven by `browser/*.mjs`, against the real daemon.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // a test that cannot start its subject has failed
 use palpate_system_tests::{programs, root};
-use std::{path::Path, process::Command};
+use std::{
+    path::Path,
+    process::Command,
+    sync::{Mutex, PoisonError},
+};
+
+/// A browser without a graphics card takes two processors whole: beside another, what is timed in it is late.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// Runs a script of `browser`, which gets the daemon, these arguments, and where pictures go.
 fn drive(script: &str, arguments: &[&Path]) {
@@ -10,6 +17,7 @@ fn drive(script: &str, arguments: &[&Path]) {
         browser.join("node_modules/playwright-core").exists(),
         "the browser's driver is not installed: run tests/run, which installs it (npm ci in tests/system/browser)"
     );
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let output = Command::new("node")
         .arg(browser.join(script))
         .arg(programs::path_of("palpated"))
