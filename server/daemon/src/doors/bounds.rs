@@ -5,7 +5,7 @@ use std::time::Duration;
 /// What connections have to keep to. Tests make them small.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bounds {
-    /// Connections at a time, over all sockets. One more takes the place of the oldest that has asked for nothing yet.
+    /// Connections at a time, over all sockets. One more takes the place of whoever has been idle for longest.
     pub connections: usize,
     /// Streams of viewers, of health and of reflection at a time.
     pub streams: usize,

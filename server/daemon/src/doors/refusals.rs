@@ -33,7 +33,7 @@ pub enum Reason {
     Full,
     /// As many requests are being answered as there may be.
     Busy,
-    /// Its place was given to another, as it had asked for nothing.
+    /// Its place was given to another, as it was idle for longest.
     Evicted,
     /// Its TLS handshake failed, or took too long.
     Handshake,
@@ -64,7 +64,7 @@ pub const REASONS: [(Reason, &str, &str); 13] = [
     ),
     (Reason::Full, "full", "a connection was refused: all places are taken"),
     (Reason::Busy, "busy", "a request was refused: as many are being answered as there may be"),
-    (Reason::Evicted, "evicted", "a connection that had asked for nothing was closed, to let another in"),
+    (Reason::Evicted, "evicted", "the connection that was idle for longest was closed, to let another in"),
     (Reason::Handshake, "handshake", "a TLS handshake failed or took too long"),
     (Reason::Silent, "silent", "a connection was closed, as it asked for nothing"),
     (Reason::Idle, "idle", "a connection was closed, as it had asked for nothing any more"),
