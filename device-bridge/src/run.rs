@@ -24,8 +24,6 @@ use tokio::{
 };
 use tokio_util::sync::CancellationToken;
 
-/// How far the priority of the stream is below the servo's.
-const BELOW_THE_SERVO: u8 = 10;
 /// How often changes of the link are looked for.
 const WATCH_PERIOD: Duration = Duration::from_millis(20);
 /// Beyond the ramp, how long the servo may take to stop.
@@ -194,8 +192,7 @@ fn start_uplink(
     of_servo: OsMeasures,
 ) -> Result<oneshot::Receiver<Result<(), BridgeError>>, BridgeError> {
     let system = |source| BridgeError::System { what: "start the thread of the stream", source };
-    let fifo_priority = of_servo.fifo_priority.map(|priority| priority.saturating_sub(BELOW_THE_SERVO).max(1));
-    let measures = OsMeasures { fifo_priority, ..OsMeasures::NONE };
+    let measures = of_servo.of_stream();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
     let (tell, ended) = oneshot::channel();
     let body = move || {

@@ -59,10 +59,20 @@ pub struct Granted {
     _awake: Option<File>,
 }
 
+/// How far the priority of a stream's thread is below its loop's.
+const BELOW_THE_LOOP: u8 = 10;
 /// Stack that is touched beforehand: more than a tick uses.
 const PREFAULT_BYTES: usize = 256 * 1024;
 
 impl OsMeasures {
+    /// What the thread of the loop's stream asks for: a priority below the loop's, if that has one. Memory is locked for the process, and
+    /// processors are kept awake for all.
+    #[must_use]
+    pub fn of_stream(self) -> Self {
+        let fifo_priority = self.fifo_priority.map(|priority| priority.saturating_sub(BELOW_THE_LOOP).max(1));
+        Self { fifo_priority, ..Self::NONE }
+    }
+
     /// Asks for everything, on the thread that will run the loop. Allocates and logs nothing to files: call before the loop.
     #[must_use = "the notes are for the user, and dropping them lets the processors sleep"]
     pub fn apply(&self) -> Granted {

@@ -30,8 +30,6 @@ use tokio_util::sync::CancellationToken;
 
 /// States that requests may hold beside the running one: copies for status and snapshots, and restored ones.
 const MOST_STATES: usize = 8;
-/// How far the priority of arms' streams is below the loop's.
-const BELOW_THE_LOOP: u8 = 10;
 /// How long open streams may take to end once forces are zero.
 const STREAMS_END_WITHIN: Duration = Duration::from_secs(2);
 
@@ -95,7 +93,7 @@ pub async fn start_with(
     let config = config.checked()?;
     let doors = Doors::open(config.listen, config.tls.as_ref(), config.unix.as_deref()).await?;
     let system = |source| ServeError::System { what: "thread for arms", source };
-    let lane = Lane::start(of_lane(config.measures)).await.map_err(system)?;
+    let lane = Lane::start(config.measures.of_stream()).await.map_err(system)?;
     let hub = Hub::new(config.display_rate_hz);
     let numbers = Numbers::new(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()));
     let settings = SessionSettings {
@@ -142,12 +140,6 @@ pub async fn start_with(
     let servers = doors.serve(&routers, &lane.handle, config.bounds, &daemon.refusals, &closing);
     let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), the_loop, health, servers, lane, closing, config));
     Ok(Running { address, notes, daemon, ended })
-}
-
-/// Arms' streams come before everything but the loop; its memory is locked for the whole process.
-fn of_lane(of_loop: OsMeasures) -> OsMeasures {
-    let fifo_priority = of_loop.fifo_priority.map(|priority| priority.saturating_sub(BELOW_THE_LOOP).max(1));
-    OsMeasures { fifo_priority, ..OsMeasures::NONE }
 }
 
 /// The loop's thread, once it has asked the operating system for its measures.
