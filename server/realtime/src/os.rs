@@ -224,7 +224,9 @@ mod tests {
             let note = fifo(7);
             // SAFETY: no arguments but a thread id; 0 is the calling thread.
             let policy = unsafe { libc::sched_getscheduler(0) };
-            assert_eq!(note.granted, policy == libc::SCHED_FIFO, "{note}");
+            let (fifo, reset) = (policy & !libc::SCHED_RESET_ON_FORK, policy & libc::SCHED_RESET_ON_FORK);
+            assert_eq!(note.granted, fifo == libc::SCHED_FIFO, "{note}");
+            assert_eq!(note.granted, reset != 0, "threads begun by this one start at normal priority: {note}");
         })
         .join()
         .unwrap();
