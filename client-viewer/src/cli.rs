@@ -1,6 +1,7 @@
 //! Arguments, and which file does what.
 use crate::{ViewError, connect::Server, control, export, inject, picture, status, watch};
 use clap::{Args, Parser, Subcommand};
+use palpate_proto::connect::Credentials;
 use std::{
     fs,
     io::{ErrorKind, Write as _},
@@ -35,6 +36,26 @@ struct ServerArguments {
     /// Certificate authority to trust for https:// (PEM file)
     #[arg(long, global = true, value_name = "FILE")]
     tls_ca: Option<PathBuf>,
+    /// Certificate to show (PEM file, `palpated pki issue`)
+    #[arg(long, global = true, value_name = "FILE", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Its key (PEM file)
+    #[arg(long, global = true, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Token to show (`palpated pki token`); better in the environment, where others do not see it
+    #[arg(long, global = true, env = "PALPATE_TOKEN", hide_env_values = true, value_name = "TOKEN")]
+    token: Option<String>,
+}
+
+impl ServerArguments {
+    fn server(&self) -> Server {
+        let credentials = Credentials {
+            authority: self.tls_ca.clone(),
+            certificate: self.tls_cert.clone().zip(self.tls_key.clone()),
+            token: self.token.clone(),
+        };
+        Server { address: self.server.clone(), credentials }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -62,7 +83,7 @@ enum Command {
 /// # Errors
 /// [`ViewError`], with the next step.
 pub fn run(arguments: &Arguments) -> Result<(), ViewError> {
-    let server = Server { address: arguments.server.server.clone(), tls_ca: arguments.server.tls_ca.clone() };
+    let server = arguments.server.server();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(|source| {
         ViewError::File { action: "cannot start the runtime of", path: "palpate-view".into(), source }
     })?;

@@ -1,19 +1,17 @@
 //! Where the daemon is, and a channel to it.
 use crate::ViewError;
 use palpate_proto::{
-    connect::{self, ConnectError, is_transport, why_no_answer, why_unreachable},
+    connect::{self, ConnectError, Connection, Credentials, is_transport, why_no_answer, why_unreachable},
     v1::{ListRequest, session_client::SessionClient},
 };
-use std::path::PathBuf;
-use tonic::transport::Channel;
 
 /// A daemon's address: `http://`, `https://` (with the certificate authority to trust) or `unix://`.
 #[derive(Debug, Clone)]
 pub struct Server {
     /// Address as given.
     pub address: String,
-    /// Certificate authority (PEM file) for `https://`.
-    pub tls_ca: Option<PathBuf>,
+    /// Whom it trusts, and what it shows of itself.
+    pub credentials: Credentials,
 }
 
 impl Server {
@@ -21,10 +19,12 @@ impl Server {
     ///
     /// # Errors
     /// [`ViewError::Address`], [`ViewError::File`] or [`ViewError::Unreachable`].
-    pub async fn connect(&self) -> Result<Channel, ViewError> {
-        let endpoint = connect::endpoint(&self.address, self.tls_ca.as_deref())?;
+    pub async fn connect(&self) -> Result<Connection, ViewError> {
+        let endpoint = connect::endpoint(&self.address, &self.credentials)?;
+        let bearer = self.credentials.bearer()?;
         let unreachable = |reason| ViewError::Unreachable { address: self.address.clone(), reason };
         let channel = endpoint.connect().await.map_err(|error| unreachable(why_unreachable(&error)))?;
+        let channel = Connection::new(channel, bearer);
         // A connection says nothing of who is at its other end; any answer does, a refusal too.
         match SessionClient::new(channel.clone()).list(ListRequest {}).await {
             Err(status) if is_transport(&status) => Err(unreachable(why_no_answer(&status))),
@@ -37,7 +37,10 @@ impl From<ConnectError> for ViewError {
     fn from(error: ConnectError) -> Self {
         match error {
             ConnectError::Address { address, reason } => Self::Address { address, reason },
-            ConnectError::Authority { path, source } => Self::File { action: "cannot read", path, source },
+            ConnectError::Authority { path, source } | ConnectError::Own { path, source, .. } => {
+                Self::File { action: "cannot read", path, source }
+            }
+            ConnectError::Token => Self::Token(error.to_string()),
         }
     }
 }

@@ -1,15 +1,15 @@
-//! `load`, `reset`, `pause`, `resume`, `step`, `save`, `restore`: what happens to the session.
+//! `load`, `reset`, `detach`, `pause`, `resume`, `step`, `save`, `restore`: what happens to the session.
 use crate::{ViewError, cli, connect::Server};
 use clap::{Args, Subcommand};
 use palpate_proto::{
     MAX_SNAPSHOT_BYTES,
+    connect::Connection,
     v1::{
-        ListRequest, LoadSceneRequest, PauseRequest, ResetRequest, RestoreRequest, SnapshotRequest, StepRequest,
-        load_scene_request::Source, session_client::SessionClient,
+        DetachRequest, ListRequest, LoadSceneRequest, PauseRequest, ResetRequest, RestoreRequest, SnapshotRequest,
+        StepRequest, load_scene_request::Source, session_client::SessionClient,
     },
 };
 use std::path::PathBuf;
-use tonic::transport::Channel;
 
 /// The commands that change a session. Forces on arms ramp to zero before time stops or jumps.
 #[derive(Debug, Subcommand)]
@@ -27,6 +27,12 @@ pub enum Control {
     },
     /// Puts the body back to rest at tick 0; ends a quarantine
     Reset,
+    /// Takes a tool from the arm that drives it; the force ramps to zero, and the arm does not come back by itself
+    Detach {
+        /// Tool of the scene [default: the only one that an arm drives]
+        #[arg(default_value = "", hide_default_value = true)]
+        tool: String,
+    },
     /// Stops time
     Pause,
     /// Lets time go on
@@ -72,6 +78,11 @@ pub async fn run(server: &Server, control: &Control) -> Result<(), ViewError> {
             let tick = client.reset(ResetRequest { session_id }).await?.into_inner().tick;
             format!("at rest, at tick {tick}")
         }
+        Control::Detach { tool } => {
+            let request = DetachRequest { session_id, tool_name: tool.clone() };
+            let done = client.detach(request).await?.into_inner();
+            format!("tool \"{}\" is free: device \"{}\" has no force and is gone", done.tool_name, done.device_name)
+        }
         Control::Pause => {
             let tick = client.pause(PauseRequest { session_id, paused: true }).await?.into_inner().tick;
             format!("paused at tick {tick}; `palpate-view resume` lets time go on")
@@ -98,7 +109,7 @@ pub async fn run(server: &Server, control: &Control) -> Result<(), ViewError> {
     cli::say(&said)
 }
 
-async fn load(client: &mut SessionClient<Channel>, scene: &PathBuf, on_daemon: bool) -> Result<String, ViewError> {
+async fn load(client: &mut SessionClient<Connection>, scene: &PathBuf, on_daemon: bool) -> Result<String, ViewError> {
     let name = scene.to_string_lossy().into_owned();
     let builtin = client.list(ListRequest {}).await?.into_inner().builtin_scenes;
     let source = if on_daemon {

@@ -16,6 +16,9 @@ pub enum ViewError {
         /// What is wrong with it.
         reason: String,
     },
+    /// The token cannot be sent.
+    #[error("{0}")]
+    Token(String),
     /// Nobody answers.
     #[error("no daemon answers at {address}: {reason}")]
     #[diagnostic(help("is `palpated` running there? it prints its address when it starts; give it with --server"))]

@@ -1,12 +1,15 @@
 //! The deformed surface rebuilt from the stream: keyframe chunks, then displacements of changed vertices in quanta.
 use crate::ViewError;
 use glam::Vec3;
-use palpate_proto::v1::{
-    KeyframeChunk, KeyframeHeader, LevelOfDetail, SurfaceUpdate, WatchRequest, surface_client::SurfaceClient,
-    surface_event::Message,
+use palpate_proto::{
+    connect::Connection,
+    v1::{
+        KeyframeChunk, KeyframeHeader, LevelOfDetail, SurfaceUpdate, WatchRequest, surface_client::SurfaceClient,
+        surface_event::Message,
+    },
 };
 use std::time::Duration;
-use tonic::{Streaming, transport::Channel};
+use tonic::Streaming;
 
 /// A daemon sends updates at the asked rate, even while time stands: silence for so much longer is a fault.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -77,7 +80,7 @@ impl Watcher {
     ///
     /// # Errors
     /// The daemon's refusal, among them a rate that it does not give.
-    pub async fn start(channel: Channel, max_rate_hz: f64, detail: LevelOfDetail) -> Result<Self, ViewError> {
+    pub async fn start(channel: Connection, max_rate_hz: f64, detail: LevelOfDetail) -> Result<Self, ViewError> {
         let level_of_detail = detail as i32;
         Self::ask(channel, WatchRequest { max_rate_hz, level_of_detail, ..Default::default() }).await
     }
@@ -86,7 +89,7 @@ impl Watcher {
     ///
     /// # Errors
     /// The daemon's refusal, among them a rate that it does not give.
-    pub async fn ask(channel: Channel, request: WatchRequest) -> Result<Self, ViewError> {
+    pub async fn ask(channel: Connection, request: WatchRequest) -> Result<Self, ViewError> {
         let max_rate_hz = request.max_rate_hz;
         let stream = SurfaceClient::new(channel).watch(request).await?.into_inner();
         // The daemon has taken the rate: 0 (its own) or up to 240 Hz.

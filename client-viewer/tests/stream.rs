@@ -1,5 +1,6 @@
 //! Streams that end in every way but the good one, from a server over a real socket.
 #![allow(clippy::unwrap_used)]
+use palpate_proto::connect::Credentials;
 use palpate_proto::v1::{
     self, LevelOfDetail, SurfaceEvent, SurfaceUpdate, WatchRequest,
     surface_event::Message,
@@ -44,7 +45,7 @@ async fn serve() -> (Server, mpsc::Receiver<Events>, JoinHandle<()>) {
     let running = tokio::spawn(async move {
         service.serve_with_incoming(TcpListenerStream::new(listener)).await.unwrap();
     });
-    (Server { address, tls_ca: None }, streams, running)
+    (Server { address, credentials: Credentials::default() }, streams, running)
 }
 
 async fn watch(server: &Server) -> Watcher {
@@ -77,7 +78,8 @@ async fn a_stream_that_the_daemon_ends_is_an_end() {
 #[tokio::test]
 async fn a_server_of_another_kind_and_no_server_are_told_apart() {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let server = Server { address: format!("http://{}", listener.local_addr().unwrap()), tls_ca: None };
+    let server =
+        Server { address: format!("http://{}", listener.local_addr().unwrap()), credentials: Credentials::default() };
     let web = tokio::spawn(async move {
         while let Ok((mut stream, _)) = listener.accept().await {
             let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n").await;
@@ -89,7 +91,7 @@ async fn a_server_of_another_kind_and_no_server_are_told_apart() {
     let _ = web.await;
     let error = server.connect().await.unwrap_err();
     assert!(matches!(&error, ViewError::Unreachable { reason, .. } if reason.contains("nothing listens")), "{error}");
-    let server = Server { address: "unix:///nowhere/palpate.sock".into(), tls_ca: None };
+    let server = Server { address: "unix:///nowhere/palpate.sock".into(), credentials: Credentials::default() };
     let error = server.connect().await.unwrap_err();
     assert!(matches!(&error, ViewError::Unreachable { reason, .. } if reason.contains("no such socket")), "{error}");
 }
@@ -99,7 +101,8 @@ async fn a_server_of_another_kind_and_no_server_are_told_apart() {
 async fn a_lost_connection_is_no_refusal_and_a_refusal_is_no_lost_connection() {
     let (server, mut streams, _running) = serve().await;
     let far_end = TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let through = Server { address: format!("http://{}", far_end.local_addr().unwrap()), tls_ca: None };
+    let through =
+        Server { address: format!("http://{}", far_end.local_addr().unwrap()), credentials: Credentials::default() };
     let target = server.address.trim_start_matches("http://").to_owned();
     let wire = tokio::spawn(async move {
         let (mut near, _) = far_end.accept().await.unwrap();

@@ -59,6 +59,15 @@ pub struct Cli {
     /// Certificate authority to trust for https:// (PEM file)
     #[arg(long, value_name = "FILE")]
     tls_ca: Option<PathBuf>,
+    /// Certificate to show, of the role device (PEM file, `palpated pki issue`)
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    tls_cert: Option<PathBuf>,
+    /// Its key (PEM file)
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    tls_key: Option<PathBuf>,
+    /// Token to show in a certificate's place; better in the environment, where others do not see it
+    #[arg(long, env = "PALPATE_TOKEN", hide_env_values = true, value_name = "TOKEN")]
+    token: Option<String>,
     /// Tool of the scene to drive [default: the first that waits for a device]
     #[arg(long, value_name = "NAME")]
     tool: Option<String>,
@@ -219,6 +228,9 @@ impl Cli {
         replace(&mut server.tool, self.tool.clone());
         replace(&mut server.device_name, self.name.clone());
         server.tls_ca = self.tls_ca.clone().or(server.tls_ca.take());
+        server.tls_cert = self.tls_cert.clone().or(server.tls_cert.take());
+        server.tls_key = self.tls_key.clone().or(server.tls_key.take());
+        server.token.clone_from(&self.token);
         server.give_up_after_s = self.give_up_after_s.or(server.give_up_after_s);
         replace(&mut config.servo.report_every_s, self.report_every_s);
         replace(&mut config.limits.max_force_n, self.max_force_n);

@@ -78,6 +78,9 @@ pub fn hello(settings: &UplinkSettings) -> v1::DeviceUp {
         max_force_n,
         servo_rate_hz,
         max_torque_nm: settings.max_torque_nm,
+        // A sample for every round of the servo; how old one may be is the daemon's to say.
+        sample_rate_hz: servo_rate_hz,
+        pose_valid_for_s: 0.0,
     };
     v1::DeviceUp { message: Some(v1::device_up::Message::Hello(hello)) }
 }

@@ -1,6 +1,6 @@
 //! What stops a bridge, and what to do about it.
 use miette::{Diagnostic, NamedSource, SourceSpan};
-use std::path::PathBuf;
+use std::{path::PathBuf, process::ExitCode};
 use thiserror::Error;
 
 /// An error of the bridge.
@@ -79,6 +79,15 @@ pub enum BridgeError {
         /// What to do.
         help: &'static str,
     },
+    /// Somebody took the tool from this arm.
+    #[error("the daemon at {address} reports: {message}")]
+    #[diagnostic(help("start the bridge again when the arm is wanted again"))]
+    Dismissed {
+        /// Address.
+        address: String,
+        /// Its words.
+        message: String,
+    },
     /// The operating system refused something the bridge cannot do without.
     #[error("cannot {what}")]
     System {
@@ -110,6 +119,13 @@ pub enum BridgeError {
     #[error("the servo thread stopped unexpectedly; the arm gets no force")]
     #[diagnostic(help("this is a defect: please report it with the output above"))]
     ServoDied,
+}
+
+impl BridgeError {
+    /// What the program ends with: 3 when somebody took the tool from the arm, so that whoever starts programs again leaves it; else 1.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(if matches!(self, Self::Dismissed { .. }) { 3 } else { 1 })
+    }
 }
 
 /// A mistake in a configuration, and where.

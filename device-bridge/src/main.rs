@@ -6,5 +6,9 @@ use std::process::ExitCode;
 fn main() -> miette::Result<ExitCode> {
     // Messages are not wrapped: flags and paths stay whole, and a log has one line for one message.
     miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())))?;
-    Cli::parse().run().map_err(miette::Report::new)
+    Ok(Cli::parse().run().unwrap_or_else(|error| {
+        let code = error.exit_code();
+        eprintln!("Error: {:?}", miette::Report::new(error));
+        code
+    }))
 }

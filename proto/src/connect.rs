@@ -14,8 +14,10 @@ use tokio::{
 };
 use tokio_util::either::Either;
 use tonic::{
-    Status,
-    transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Uri},
+    Request, Status,
+    metadata::AsciiMetadataValue,
+    service::{Interceptor, interceptor::InterceptedService},
+    transport::{Certificate, Channel, ClientTlsConfig, Endpoint, Identity, Uri},
 };
 
 /// Longest wait for a connection.
@@ -42,13 +44,64 @@ pub enum ConnectError {
         /// Why.
         source: io::Error,
     },
+    /// The own certificate or key cannot be read.
+    #[error("cannot read the {what} {path}: {source}", path = path.display())]
+    Own {
+        /// `certificate` or `key`.
+        what: &'static str,
+        /// Its path.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The token cannot be sent.
+    #[error("the token holds what no token does: `palpated pki token` prints one, in one line")]
+    Token,
 }
 
-/// The endpoint of an address; `https://` needs the certificate authority (PEM file) to trust.
+/// Whom a client trusts, and what it shows of itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Credentials {
+    /// Certificate authority (PEM file) to trust for `https://`.
+    pub authority: Option<PathBuf>,
+    /// Its own certificate and key (PEM files), signed by the daemon's authority.
+    pub certificate: Option<(PathBuf, PathBuf)>,
+    /// Or its token.
+    pub token: Option<String>,
+}
+
+impl Credentials {
+    /// What puts the token into every call.
+    ///
+    /// # Errors
+    /// [`ConnectError::Token`].
+    pub fn bearer(&self) -> Result<Bearer, ConnectError> {
+        let header = self.token.as_ref().map(|token| format!("Bearer {}", token.trim()).parse());
+        header.transpose().map(Bearer).map_err(|_| ConnectError::Token)
+    }
+}
+
+/// Puts a token, if there is one, into every call.
+#[derive(Debug, Clone)]
+pub struct Bearer(Option<AsciiMetadataValue>);
+
+impl Interceptor for Bearer {
+    fn call(&mut self, mut request: Request<()>) -> Result<Request<()>, Status> {
+        if let Some(token) = &self.0 {
+            request.metadata_mut().insert("authorization", token.clone());
+        }
+        Ok(request)
+    }
+}
+
+/// A channel whose calls carry a token, if there is one.
+pub type Connection = InterceptedService<Channel, Bearer>;
+
+/// The endpoint of an address; `https://` needs the certificate authority to trust.
 ///
 /// # Errors
 /// [`ConnectError`].
-pub fn endpoint(address: &str, authority: Option<&Path>) -> Result<Endpoint, ConnectError> {
+pub fn endpoint(address: &str, credentials: &Credentials) -> Result<Endpoint, ConnectError> {
     let bad = |reason: String| ConnectError::Address { address: address.to_owned(), reason };
     let scheme = address.split_once("://").map(|(scheme, _)| scheme);
     if !matches!(scheme, Some("http" | "https" | "unix")) {
@@ -63,7 +116,10 @@ pub fn endpoint(address: &str, authority: Option<&Path>) -> Result<Endpoint, Con
     if scheme != Some("unix") && endpoint.uri().port_u16().is_none() {
         return Err(bad("it names no port, 1 to 65535; `palpated` takes 7411 unless it is told another".to_owned()));
     }
-    match (authority, scheme) {
+    if scheme != Some("https") && (credentials.certificate.is_some() || credentials.token.is_some()) {
+        return Err(bad("a certificate or a token is shown by https:// only".to_owned()));
+    }
+    match (credentials.authority.as_deref(), scheme) {
         (None, Some("https")) => {
             Err(bad("https needs the certificate authority to trust: give its PEM file with --tls-ca".to_owned()))
         }
@@ -74,7 +130,13 @@ pub fn endpoint(address: &str, authority: Option<&Path>) -> Result<Endpoint, Con
                 let none = "it holds no certificate in PEM form, which has a line -----BEGIN CERTIFICATE-----";
                 return Err(unread(io::Error::new(io::ErrorKind::InvalidData, none)));
             }
-            let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(pem));
+            let mut tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(pem));
+            if let Some((certificate, key)) = &credentials.certificate {
+                let read = |what, path: &Path| {
+                    fs::read(path).map_err(|source| ConnectError::Own { what, path: path.to_owned(), source })
+                };
+                tls = tls.identity(Identity::from_pem(read("certificate", certificate)?, read("key", key)?));
+            }
             endpoint.tls_config(tls).map_err(|error| bad(causes(&error)))
         }
         (Some(_), _) => Err(bad("a certificate authority is given, but the address is not https://".to_owned())),
@@ -172,7 +234,8 @@ mod tests {
     use super::*;
 
     fn refused(address: &str, authority: Option<&str>) -> String {
-        endpoint(address, authority.map(Path::new)).unwrap_err().to_string()
+        let authority = authority.map(PathBuf::from);
+        endpoint(address, &Credentials { authority, ..Credentials::default() }).unwrap_err().to_string()
     }
 
     #[test]
@@ -185,5 +248,18 @@ mod tests {
         assert!(refused("http://host:7411", Some("ca.pem")).contains("not https"));
         let missing = refused("https://host:7411", Some("/nowhere/ca.pem"));
         assert!(missing.contains("cannot read the certificate authority /nowhere/ca.pem"), "{missing}");
+    }
+
+    /// A token sent in the clear is anybody's.
+    #[test]
+    fn what_tells_a_client_apart_is_shown_by_tls_only() {
+        let token = Credentials { token: Some("palpate1.x".into()), ..Credentials::default() };
+        let own = Credentials { certificate: Some(("a.pem".into(), "a.key".into())), ..Credentials::default() };
+        for credentials in [token, own] {
+            let refusal = endpoint("http://host:7411", &credentials).unwrap_err().to_string();
+            assert!(refusal.contains("https:// only"), "{refusal}");
+        }
+        let broken = Credentials { token: Some("palpate1\nx".into()), ..Credentials::default() };
+        assert!(matches!(broken.bearer(), Err(ConnectError::Token)));
     }
 }

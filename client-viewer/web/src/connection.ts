@@ -2,6 +2,7 @@
 import { createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { isBug, reasonOf } from "./reason";
+import { ownToken } from "./token";
 import { fetchSurfaceService, type SurfaceEvent, type WatchRequest } from "./wire";
 
 export type ConnectionState = { state: "connecting" | "live" | "lost"; text: string };
@@ -59,7 +60,14 @@ async function watchOnce(
   let watchdog = window.setTimeout(() => abort.abort(silence), SILENCE_MS);
   try {
     const service = await fetchSurfaceService(abort.signal);
-    const transport = createGrpcWebTransport({ baseUrl: new URL(".", window.location.href).href.replace(/\/$/, "") });
+    const token = ownToken();
+    const transport = createGrpcWebTransport({
+      baseUrl: new URL(".", window.location.href).href.replace(/\/$/, ""),
+      interceptors: token === null ? [] : [(next) => (call) => {
+        call.header.set("authorization", `Bearer ${token}`);
+        return next(call);
+      }],
+    });
     const client = createClient(service, transport) as unknown as {
       watch(request: WatchRequest, options: { signal: AbortSignal }): AsyncIterable<SurfaceEvent>;
     };

@@ -54,6 +54,15 @@ pub struct ServerConfig {
     /// Certificate authority (PEM) to trust for `https://`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tls_ca: Option<PathBuf>,
+    /// Certificate to show (PEM), of the role device: `palpated pki issue`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tls_cert: Option<PathBuf>,
+    /// Its key (PEM).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tls_key: Option<PathBuf>,
+    /// Token to show in a certificate's place; from the environment only.
+    #[serde(skip)]
+    pub token: Option<String>,
     /// Tool of the scene to drive; empty: the first that waits for a device.
     pub tool: String,
     /// Name of this arm for people and logs.
@@ -75,6 +84,9 @@ impl Default for ServerConfig {
         Self {
             url: "http://127.0.0.1:7411".into(),
             tls_ca: None,
+            tls_cert: None,
+            tls_key: None,
+            token: None,
             tool: String::new(),
             device_name: "simulated".into(),
             first_pause_s: 0.1,

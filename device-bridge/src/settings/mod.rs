@@ -13,7 +13,7 @@ use crate::{
 pub use arm::ArmSettings;
 use glam::DVec3;
 use palpate_control::{ParameterError, StiffnessBound, WatchdogSettings};
-use palpate_proto::connect::{self, ConnectError};
+use palpate_proto::connect::{self, Bearer, ConnectError, Credentials};
 use palpate_realtime::OsMeasures;
 pub use servo::ServoSettings;
 use std::time::Duration;
@@ -44,6 +44,8 @@ pub struct Settings {
 pub struct UplinkSettings {
     /// Where to connect.
     pub endpoint: Endpoint,
+    /// What shows the token, if there is one.
+    pub bearer: Bearer,
     /// The same, for people.
     pub address: String,
     /// Tool of the scene.
@@ -149,8 +151,18 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
         }
     }
     let give_up_after = server.give_up_after_s.map(|s| seconds("server.give_up_after_s", s)).transpose()?;
+    let certificate = match (&server.tls_cert, &server.tls_key) {
+        (Some(certificate), Some(key)) => Some((certificate.clone(), key.clone())),
+        (None, None) => None,
+        _ => {
+            let reason = "a certificate and its key are given together: server.tls_cert and server.tls_key";
+            return Err(value("server.tls_cert", reason.to_owned()));
+        }
+    };
+    let credentials = Credentials { authority: server.tls_ca.clone(), certificate, token: server.token.clone() };
     Ok(UplinkSettings {
-        endpoint: connect::endpoint(&server.url, server.tls_ca.as_deref()).map_err(unusable)?,
+        endpoint: connect::endpoint(&server.url, &credentials).map_err(unusable)?,
+        bearer: credentials.bearer().map_err(unusable)?,
         address: server.url.clone(),
         tool: server.tool.clone(),
         device_name: server.device_name.clone(),
@@ -168,6 +180,10 @@ fn unusable(error: ConnectError) -> BridgeError {
         ConnectError::Address { address, reason } => BridgeError::Address { address, reason },
         ConnectError::Authority { path, source } => {
             BridgeError::Read { what: "the certificate authority", path, source }
+        }
+        ConnectError::Token => value("PALPATE_TOKEN", error.to_string()),
+        ConnectError::Own { path, source, .. } => {
+            BridgeError::Read { what: "the bridge's certificate or key", path, source }
         }
     }
 }

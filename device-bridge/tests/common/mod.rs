@@ -186,6 +186,7 @@ fn welcome(max_force_n: f64) -> DeviceDown {
         stale_after_s: 0.05,
         ramp_to_zero_s: 0.05,
         max_torque_nm: 0.0,
+        lease_s: 0.2,
         max_torque_rate_nm_per_s: 0.0,
     };
     let welcome = v1::DeviceWelcome {

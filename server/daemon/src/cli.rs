@@ -1,5 +1,5 @@
 //! The command line: subcommands and their flags, parsed once into types.
-use crate::{offline, serve};
+use crate::{offline, serve, who};
 use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind};
 use std::{ffi::OsString, path::Path, process::ExitCode};
 
@@ -12,6 +12,7 @@ Examples:
   palpated simulate ventricle --out run     run headless: probes as CSV, frames as VTU, a JSON summary
   palpated static cantilever --out rest     find the equilibrium instead of integrating in time
   palpated schema > palpate-scene.json      JSON schema of scene files, for editors
+  palpated pki init --host lab-7            keys for a daemon on a network; then serve --pki and --listen
 
 Scenes are TOML files (docs/scenes.md), or names of built-in ones: palpated check --list.
 Logs: PALPATE_LOG=debug says more, PALPATE_LOG_FORMAT=json writes lines of JSON.";
@@ -32,7 +33,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Run a scene in real time for arms and viewers (the default)
-    Serve(serve::args::ServeArgs),
+    Serve(Box<serve::args::ServeArgs>),
     /// Run a scene headless, as fast as it goes, and write what it measured
     Simulate(offline::simulate::SimulateArgs),
     /// Find the equilibrium of a scene under its final loads, and write the same files
@@ -45,6 +46,8 @@ enum Command {
     Calibrate(offline::calibrate::CalibrateArgs),
     /// Print the JSON schema of scene files
     Schema,
+    /// Make keys for a daemon that others reach by a network, and say who may do what
+    Pki(who::commands::PkiArgs),
 }
 
 impl Cli {
@@ -74,6 +77,7 @@ impl Cli {
             Some(Command::FitBudget(args)) => offline::fit_budget::run(&args),
             Some(Command::Calibrate(args)) => offline::calibrate::run(&args),
             Some(Command::Schema) => offline::schema::run(),
+            Some(Command::Pki(args)) => who::commands::run(&args),
         }
     }
 }

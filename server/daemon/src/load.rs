@@ -1,4 +1,5 @@
 //! Scenes by name, path or text.
+use crate::kept::folder::Source;
 use miette::{Diagnostic, Report};
 use palpate_proto::v1::load_scene_request::Source as WireSource;
 use palpate_scene::{Limits, Scene, builtin_names, load_builtin, load_file, parse};
@@ -20,19 +21,33 @@ struct UnknownScene {
 ///
 /// # Errors
 /// Neither, or the scene is refused; the report points into the file.
-pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette::Result<Scene> {
+pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette::Result<(Scene, Source)> {
     let limits = Limits::local();
     let path = Path::new(name);
     let built_in = if path.is_file() { None } else { load_builtin(name, &limits, progress) };
     if let Some(scene) = built_in {
-        return scene.map_err(Report::new);
+        return scene.map(|scene| (scene, Source::Named(name.to_owned()))).map_err(Report::new);
     }
     if path.exists() {
-        return load_file(path, &limits, progress).map_err(Report::new);
+        let scene = load_file(path, &limits, progress).map_err(Report::new)?;
+        // It is found from another working directory, too.
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        return Ok((scene, Source::Named(real.to_string_lossy().into_owned())));
     }
     let near = builtin_names().iter().find(|known| strsim::jaro_winkler(name, known) > 0.8);
     let near = near.map_or(String::new(), |near| format!("did you mean {near}? "));
     Err(UnknownScene { name: name.to_owned(), near, known: builtin_names().join(", ") }.into())
+}
+
+/// Loads what was kept of a session.
+///
+/// # Errors
+/// As [`from_argument`], or as a scene's text is refused.
+pub fn from_kept(source: &Source, progress: &mut dyn FnMut(f64, &str)) -> miette::Result<Scene> {
+    match source {
+        Source::Named(name) => from_argument(name, progress).map(|(scene, _)| scene),
+        Source::Text(text) => parse(text, "kept scene", None, &Limits::wire(), progress).map_err(Report::new),
+    }
 }
 
 /// Loads what a client asks for. Text from the network may be no larger than [`Limits::wire`]; what the daemon's owner
@@ -40,16 +55,23 @@ pub fn from_argument(name: &str, progress: &mut dyn FnMut(f64, &str)) -> miette:
 ///
 /// # Errors
 /// `NOT_FOUND`, `PERMISSION_DENIED` or `INVALID_ARGUMENT`, with the scene's own message.
-pub fn from_wire(source: WireSource, folders: &[PathBuf]) -> Result<Scene, Status> {
-    let scene = match source {
-        WireSource::Builtin(name) => load_builtin(&name, &Limits::wire(), &mut |_, _| ()).ok_or_else(|| {
-            let known = builtin_names().join(", ");
-            Status::not_found(format!("there is no built-in scene \"{name}\"; there are: {known}"))
-        })?,
-        WireSource::Path(path) => load_file(&allowed(Path::new(&path), folders)?, &Limits::local(), &mut |_, _| ()),
-        WireSource::Toml(text) => parse(&text, "request", None, &Limits::wire(), &mut |_, _| ()),
+pub fn from_wire(source: WireSource, folders: &[PathBuf]) -> Result<(Scene, Source), Status> {
+    let (scene, source) = match source {
+        WireSource::Builtin(name) => {
+            let scene = load_builtin(&name, &Limits::wire(), &mut |_, _| ()).ok_or_else(|| {
+                let known = builtin_names().join(", ");
+                Status::not_found(format!("there is no built-in scene \"{name}\"; there are: {known}"))
+            })?;
+            (scene, Source::Named(name))
+        }
+        WireSource::Path(path) => {
+            let path = allowed(Path::new(&path), folders)?;
+            let scene = load_file(&path, &Limits::local(), &mut |_, _| ());
+            (scene, Source::Named(path.to_string_lossy().into_owned()))
+        }
+        WireSource::Toml(text) => (parse(&text, "request", None, &Limits::wire(), &mut |_, _| ()), Source::Text(text)),
     };
-    scene.map_err(|error| Status::invalid_argument(error.one_line()))
+    scene.map(|scene| (scene, source)).map_err(|error| Status::invalid_argument(error.one_line()))
 }
 
 /// The real path, if it lies below one of the folders: links and `..` lead nowhere else.

@@ -2,8 +2,9 @@
 use crate::{
     bodies::served,
     doors::refusals::Refusals,
+    kept::{autosave::Autosave, folder::Source},
     sim::{
-        command::{Orders, Refusal, Request},
+        command::{Copy, Done, Orders, Refusal, Request},
         exchange::{SurfaceEnd, ToolEnd},
         simulation::{Parts, Simulation},
         thread::StopSign,
@@ -20,11 +21,12 @@ use std::{
     io,
     path::PathBuf,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, RwLock,
+        Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock,
         atomic::{AtomicU64, Ordering},
     },
 };
 use thiserror::Error;
+use tokio::sync::OwnedSemaphorePermit;
 use tokio_util::sync::CancellationToken;
 
 /// What every session is run with.
@@ -66,6 +68,8 @@ pub struct ActiveSession {
     pub number: u64,
     /// The scene's name.
     pub scene_name: String,
+    /// Where the scene comes from; `None`: nobody can load it again.
+    pub source: Option<Source>,
     /// The body.
     pub model: Arc<Model>,
     /// What the scene measures.
@@ -101,6 +105,20 @@ pub struct DeviceRecord {
     /// When the newest sample came (ns, monotonic), 0: none yet.
     pub newest_ns: AtomicU64,
     force_n_bits: AtomicU64,
+    dismissal: OnceLock<Dismissal>,
+    dismissed: CancellationToken,
+    gone: CancellationToken,
+}
+
+/// Why a device loses its tool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dismissal {
+    /// It sent no samples for the time of its lease.
+    Silent,
+    /// Somebody ordered it.
+    Ordered,
+    /// Its identity has ended.
+    Expired,
 }
 
 impl DeviceRecord {
@@ -112,7 +130,27 @@ impl DeviceRecord {
             rejected: AtomicU64::new(0),
             newest_ns: AtomicU64::new(0),
             force_n_bits: AtomicU64::new(0),
+            dismissal: OnceLock::new(),
+            dismissed: CancellationToken::new(),
+            gone: CancellationToken::new(),
         })
+    }
+
+    /// Takes the tool from it, with the first reason that is given.
+    pub fn dismiss(&self, why: Dismissal) {
+        let _ = self.dismissal.set(why);
+        self.dismissed.cancel();
+    }
+
+    /// Why it loses its tool, as soon as it does.
+    pub async fn dismissed(&self) -> Dismissal {
+        self.dismissed.cancelled().await;
+        self.dismissal.get().copied().unwrap_or(Dismissal::Ordered)
+    }
+
+    /// Waits until its tool is free.
+    pub async fn gone(&self) {
+        self.gone.cancelled().await;
     }
 
     /// Notes the magnitude of the last force sent (N).
@@ -141,8 +179,11 @@ impl ToolSeat {
     /// Gives it back.
     pub fn give_back(&self, end: ToolEnd) {
         end.shared.detach();
-        *lock(&self.device) = None;
+        let device = lock(&self.device).take();
         *lock(&self.end) = Some(end);
+        if let Some(device) = device {
+            device.gone.cancel();
+        }
     }
 
     /// The device that has it.
@@ -202,6 +243,8 @@ pub struct Daemon {
     pub sign: StopSign,
     /// Whoever was refused at the doors.
     pub refusals: Arc<Refusals>,
+    /// Keeps the session, if it is kept.
+    pub autosave: Option<Arc<Autosave>>,
     /// Samples dropped over all devices.
     pub samples_rejected: AtomicU64,
     pub(crate) current: RwLock<Arc<ActiveSession>>,
@@ -241,7 +284,7 @@ impl Numbers {
 /// # Errors
 /// [`PrepareError`].
 pub fn prepare(
-    scene: Scene,
+    (scene, source): (Scene, Option<Source>),
     settings: &SessionSettings,
     numbers: &Numbers,
     hub: &Hub,
@@ -278,6 +321,7 @@ pub fn prepare(
         id,
         number,
         scene_name: scene.name,
+        source,
         model,
         probes: scene.probes,
         warnings,
@@ -291,6 +335,29 @@ impl Daemon {
     /// How many states requests may still hold beside the running one.
     pub fn room_for_states_left(&self) -> usize {
         self.room_for_states.available_permits()
+    }
+
+    /// A copy of a session's state, and how time stands, with its room. The room is taken before the memory is, and goes with it: a
+    /// caller that goes away while memory is being got frees neither.
+    ///
+    /// # Errors
+    /// [`Refusal`].
+    pub async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done, OwnedSemaphorePermit), Refusal> {
+        let (room, model) = (self.room().await?, Arc::clone(&session.model));
+        let empty = tokio::task::spawn_blocking(move || (Copy::of(&model), room));
+        let (copy, room) = empty.await.map_err(|_| Refusal::Silent)?;
+        match self.orders.give(session.number, Request::Copy(Box::new(copy)), false).await? {
+            (Request::Copy(copy), done) => Ok((copy, done, room)),
+            _ => Err(Refusal::Silent),
+        }
+    }
+
+    /// Waits for room for one more state beside the running one.
+    ///
+    /// # Errors
+    /// [`Refusal::Stopping`].
+    pub async fn room(&self) -> Result<OwnedSemaphorePermit, Refusal> {
+        Arc::clone(&self.room_for_states).acquire_owned().await.map_err(|_| Refusal::Stopping)
     }
 
     /// The running session.

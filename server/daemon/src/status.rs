@@ -49,6 +49,7 @@ pub fn of(daemon: &Daemon, session: &ActiveSession, copy: &Copy, done: &Done) ->
         awake_for: copy.state.awake_for(&session.model, &copy.injected).map(awake_for),
         state_warnings: state_warnings(session, copy),
         refusals: refusals(daemon),
+        autosave_age_s: daemon.autosave.as_ref().and_then(|autosave| autosave.age_s(Clock::Monotonic.now_ns())),
     }
 }
 

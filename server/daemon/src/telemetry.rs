@@ -25,3 +25,12 @@ pub fn init() {
         _ => logs.try_init(),
     };
 }
+
+/// An error with its causes, in one line.
+pub fn causes(error: &dyn std::error::Error) -> String {
+    let chain = std::iter::successors(error.source(), |cause| cause.source());
+    chain.fold(error.to_string(), |text, cause| {
+        let next = cause.to_string();
+        if text.contains(&next) { text } else { format!("{text}: {next}") }
+    })
+}

@@ -13,7 +13,7 @@ use tower::{Service as _, ServiceExt as _};
 const SHORT: Duration = Duration::from_millis(300);
 
 async fn connected(daemon: &Daemon) -> Channel {
-    let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+    let url = format!("http://{}", daemon.running.as_ref().unwrap().address.unwrap());
     Channel::from_shared(url).unwrap().connect().await.unwrap()
 }
 

@@ -161,6 +161,7 @@ async fn a_device_is_told_that_time_stands_and_that_it_is_stale_all_the_same() {
     daemon.pause().await;
     let mut told = Vec::new();
     while told.len() < 2 {
+        // Silent for longer than a pose is good, and not for longer than a lease.
         let code = arm.fault().await.code();
         if code != DeviceFaultCode::Limited {
             told.push(code);
@@ -184,8 +185,9 @@ async fn a_fault_takes_no_commands_place() {
     arm.welcome().await;
     let mut faults = Vec::new();
     let mut ticks = vec![arm.command(&mut faults).await.tick];
-    arm.move_to(above()).await;
     while ticks.len() < 8 {
+        // Each is stale before the next tick.
+        arm.move_to(above()).await;
         ticks.push(arm.command(&mut faults).await.tick);
     }
     assert!(faults.iter().any(|fault| fault.code() == DeviceFaultCode::Stale), "{faults:?}");

@@ -4,7 +4,7 @@ mod common;
 use common::{Daemon, block_scene};
 use palpate_proto::v1::{self, session_client::SessionClient};
 use palpated::{
-    doors::{listen::ListenError, tls::TlsFiles},
+    doors::listen::ListenError,
     serve::{ServeConfig, ServeError, start},
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -27,7 +27,7 @@ async fn a_unix_socket_answers_and_replaces_one_left_over() {
     let path = folder.path().join("palpated.sock");
     drop(std::os::unix::net::UnixListener::bind(&path).unwrap());
     assert!(path.exists(), "left over, as after a crash");
-    let config = ServeConfig { unix: Some(path.clone()), ..ServeConfig::in_process() };
+    let config = ServeConfig { unix: Some(common::socket(&path)), ..ServeConfig::in_process() };
     let daemon = Daemon::with(block_scene("by unix", 2), config.clone()).await;
     let channel = Endpoint::from_shared(format!("unix://{}", path.display())).unwrap().connect().await.unwrap();
     assert_eq!(scene_name(channel).await, "by unix");
@@ -40,21 +40,19 @@ async fn a_unix_socket_answers_and_replaces_one_left_over() {
 #[tokio::test(flavor = "multi_thread")]
 async fn tls_answers_those_who_trust_it_and_nobody_else() {
     let folder = tempfile::tempdir().unwrap();
-    let made = rcgen::generate_simple_self_signed(vec!["localhost".to_owned()]).unwrap();
-    let files = TlsFiles { certificate: folder.path().join("cert.pem"), key: folder.path().join("key.pem") };
-    std::fs::write(&files.certificate, made.cert.pem()).unwrap();
-    std::fs::write(&files.key, made.signing_key.serialize_pem()).unwrap();
+    let files = common::certificate(folder.path());
+    let trusted = std::fs::read(&files.certificate).unwrap();
     let config = ServeConfig { tls: Some(files.clone()), ..ServeConfig::in_process() };
     let stop = CancellationToken::new();
     let running = start(config, block_scene("by tls", 2), stop.clone()).await.unwrap();
-    let url = format!("https://localhost:{}", running.address.port());
-    let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(made.cert.pem())).domain_name("localhost");
+    let url = format!("https://localhost:{}", running.address.unwrap().port());
+    let tls = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(trusted)).domain_name("localhost");
     let channel = Endpoint::from_shared(url.clone()).unwrap().tls_config(tls).unwrap().connect().await.unwrap();
     assert_eq!(scene_name(channel).await, "by tls");
     let other = rcgen::generate_simple_self_signed(vec!["localhost".to_owned()]).unwrap();
     let stranger = ClientTlsConfig::new().ca_certificate(Certificate::from_pem(other.cert.pem()));
     assert!(Endpoint::from_shared(url).unwrap().tls_config(stranger).unwrap().connect().await.is_err());
-    let plain = format!("http://{}", running.address);
+    let plain = format!("http://{}", running.address.unwrap());
     let plain = Endpoint::from_shared(plain).unwrap().connect_lazy();
     assert!(SessionClient::new(plain).status(v1::StatusRequest::default()).await.is_err());
     stop.cancel();
@@ -94,8 +92,8 @@ async fn a_quarantined_daemon_does_not_serve_arms() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_busy_port_is_named_with_a_way_out() {
     let daemon = Daemon::on(block_scene("first", 2)).await;
-    let listen = daemon.running.as_ref().unwrap().address;
-    let config = ServeConfig { listen, ..ServeConfig::in_process() };
+    let listen = daemon.running.as_ref().unwrap().address.unwrap();
+    let config = ServeConfig { listen: Some(listen), ..ServeConfig::in_process() };
     let busy = start(config, block_scene("second", 2), CancellationToken::new()).await.unwrap_err();
     let help = miette::Diagnostic::help(&busy).unwrap().to_string();
     assert!(busy.to_string().contains(&listen.port().to_string()) && help.contains("--listen"), "{busy} {help}");
@@ -129,7 +127,7 @@ async fn health_and_reflection_answer() {
 
 /// One HTTP/1.1 request, as a browser's.
 async fn http(daemon: &Daemon, request: &str) -> String {
-    let mut socket = tokio::net::TcpStream::connect(daemon.running.as_ref().unwrap().address).await.unwrap();
+    let mut socket = tokio::net::TcpStream::connect(daemon.running.as_ref().unwrap().address.unwrap()).await.unwrap();
     socket.write_all(request.as_bytes()).await.unwrap();
     let mut answer = Vec::new();
     socket.read_to_end(&mut answer).await.unwrap();

@@ -4,13 +4,10 @@ mod common;
 use common::{Arm, Daemon, PATIENCE, above, block_scene, hello};
 use palpate_proto::{
     ARM_SIGN,
-    connect::{connect_arm, endpoint},
+    connect::{Credentials, connect_arm, endpoint},
     v1::{self, session_client::SessionClient},
 };
-use palpated::{
-    doors::{refusals::Reason, tls::TlsFiles},
-    serve::ServeConfig,
-};
+use palpated::{doors::refusals::Reason, serve::ServeConfig};
 use std::{
     sync::{
         Arc, Barrier,
@@ -30,16 +27,16 @@ use tokio::{
 fn arms_are_answered_while_everybody_else_waits() {
     let of_all = Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     let daemon = of_all.block_on(Daemon::on(block_scene("lane", 2)));
-    let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+    let url = format!("http://{}", daemon.running.as_ref().unwrap().address.unwrap());
     let of_arm = Builder::new_current_thread().enable_all().build().unwrap();
     let mut arm = of_arm.block_on(async {
-        let channel = connect_arm(&endpoint(&url, None).unwrap(), &url).await.unwrap();
+        let channel = connect_arm(&endpoint(&url, &Credentials::default()).unwrap(), &url).await.unwrap();
         let mut arm = Arm::attach(channel, hello()).await;
         arm.welcome().await;
         arm.hold_until(above(), |command| command.sample_sequence > 0).await;
         arm
     });
-    let viewer = of_arm.block_on(endpoint(&url, None).unwrap().connect()).unwrap();
+    let viewer = of_arm.block_on(endpoint(&url, &Credentials::default()).unwrap().connect()).unwrap();
     let (busy, goes_on) = (Arc::new(Barrier::new(3)), Arc::new(AtomicBool::new(true)));
     for _ in 0..2 {
         let (busy, goes_on) = (Arc::clone(&busy), Arc::clone(&goes_on));
@@ -67,19 +64,18 @@ fn arms_are_answered_while_everybody_else_waits() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_sign_goes_before_tls_and_on_a_unix_socket() {
     let folder = tempfile::tempdir().unwrap();
-    let made = rcgen::generate_simple_self_signed(vec!["localhost".to_owned()]).unwrap();
-    let files = TlsFiles { certificate: folder.path().join("cert.pem"), key: folder.path().join("key.pem") };
-    std::fs::write(&files.certificate, made.cert.pem()).unwrap();
-    std::fs::write(&files.key, made.signing_key.serialize_pem()).unwrap();
+    let files = common::certificate(folder.path());
     let unix = folder.path().join("palpated.sock");
-    let config = ServeConfig { tls: Some(files.clone()), unix: Some(unix.clone()), ..ServeConfig::in_process() };
+    let config =
+        ServeConfig { tls: Some(files.clone()), unix: Some(common::socket(&unix)), ..ServeConfig::in_process() };
     let stop = tokio_util::sync::CancellationToken::new();
     let running = palpated::serve::start(config, block_scene("lane", 2), stop.clone()).await.unwrap();
     for (url, authority) in [
-        (format!("https://localhost:{}", running.address.port()), Some(files.certificate.as_path())),
+        (format!("https://localhost:{}", running.address.unwrap().port()), Some(files.certificate.clone())),
         (format!("unix://{}", unix.display()), None),
     ] {
-        let channel = connect_arm(&endpoint(&url, authority).unwrap(), &url).await.unwrap();
+        let credentials = Credentials { authority, ..Credentials::default() };
+        let channel = connect_arm(&endpoint(&url, &credentials).unwrap(), &url).await.unwrap();
         // No more is served there than an arm needs.
         let other = SessionClient::new(channel.clone()).status(v1::StatusRequest::default()).await.unwrap_err();
         assert_eq!(other.code(), tonic::Code::Unimplemented, "{url}");
@@ -100,7 +96,7 @@ async fn the_sign_goes_before_tls_and_on_a_unix_socket() {
 #[tokio::test(flavor = "multi_thread")]
 async fn half_a_sign_and_another_are_sent_away() {
     let daemon = Daemon::on(block_scene("lane", 2)).await;
-    let address = daemon.running.as_ref().unwrap().address;
+    let address = daemon.running.as_ref().unwrap().address.unwrap();
     let mut other = ARM_SIGN.to_vec();
     other[15] ^= 1;
     let mut socket = TcpStream::connect(address).await.unwrap();

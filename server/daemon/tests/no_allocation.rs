@@ -133,7 +133,13 @@ async fn no_tick_allocates() {
     assert!(bench.ends.tools[0].outputs.output_buffer().sample_sequence > 290, "the samples arrived");
 
     let forces: Vec<Injection> = (0..64)
-        .map(|i| Injection { node: 60 + i % 8, force_n: DVec3::X * 1e-3, from_tick: 0, tick_count: 5 + i })
+        .map(|i| Injection {
+            node: 60 + i % 8,
+            force_n: DVec3::X * 1e-3,
+            from_tick: 0,
+            tick_count: 5 + i,
+            is_bounded: false,
+        })
         .collect();
     let next_tick = bench.simulation.state().mechanical.tick + 1;
     assert!(assert_no_alloc(|| bench.simulation.inject(&forces, next_tick)).is_ok());
@@ -145,7 +151,7 @@ async fn no_tick_allocates() {
     assert_no_alloc(|| bench.simulation.reset());
     bench.ticks(50, RUN);
 
-    let absurd = [Injection { node: 60, force_n: DVec3::splat(1e308), from_tick: 0, tick_count: 1 }];
+    let absurd = [Injection { node: 60, force_n: DVec3::splat(1e308), from_tick: 0, tick_count: 1, is_bounded: false }];
     let next_tick = bench.simulation.state().mechanical.tick + 1;
     bench.simulation.inject(&absurd, next_tick).unwrap();
     bench.ticks(50, RUN); // quarantined

@@ -181,7 +181,13 @@ async fn the_loop_touches_no_heap_whatever_it_is_asked() {
         tokio::time::sleep(Duration::from_millis(1)).await;
     }
     let inject = || {
-        let force = |i: u32| Injection { node: 20 + i % 8, force_n: DVec3::X * 1e-3, from_tick: 0, tick_count: 5 + i };
+        let force = |i: u32| Injection {
+            node: 20 + i % 8,
+            force_n: DVec3::X * 1e-3,
+            from_tick: 0,
+            tick_count: 5 + i,
+            is_bounded: false,
+        };
         Request::Inject((0..64).map(force).collect())
     };
     running.give(1, inject()).await;

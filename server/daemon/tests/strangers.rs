@@ -31,11 +31,11 @@ fn count(daemon: &Daemon, reason: Reason) -> u64 {
 }
 
 async fn connect(daemon: &Daemon) -> TcpStream {
-    TcpStream::connect(daemon.running.as_ref().unwrap().address).await.unwrap()
+    TcpStream::connect(daemon.running.as_ref().unwrap().address.unwrap()).await.unwrap()
 }
 
 async fn another_channel(daemon: &Daemon) -> Channel {
-    let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+    let url = format!("http://{}", daemon.running.as_ref().unwrap().address.unwrap());
     Channel::from_shared(url).unwrap().connect().await.unwrap()
 }
 
@@ -191,7 +191,7 @@ async fn whoever_comes_when_all_places_are_in_use_is_refused() {
     drop(viewers);
     let until = Instant::now() + PATIENCE;
     loop {
-        let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+        let url = format!("http://{}", daemon.running.as_ref().unwrap().address.unwrap());
         let channel = Channel::from_shared(url).unwrap().connect_lazy();
         let mut session = v1::session_client::SessionClient::new(channel);
         if session.status(v1::StatusRequest::default()).await.is_ok() {
@@ -235,7 +235,7 @@ async fn a_peer_that_does_not_read_its_answers_is_sent_away() {
     // By HTTP/2, with windows as large as there are, and no byte of theirs is read.
     let socket = TcpSocket::new_v4().unwrap();
     socket.set_recv_buffer_size(4096).unwrap();
-    let mut socket = socket.connect(daemon.running.as_ref().unwrap().address).await.unwrap();
+    let mut socket = socket.connect(daemon.running.as_ref().unwrap().address.unwrap()).await.unwrap();
     let mut said = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n".to_vec();
     said.extend([0, 0, 6, 4, 0, 0, 0, 0, 0, 0, 4, 0x7f, 0xff, 0xff, 0xff]);
     said.extend([0, 0, 4, 8, 0, 0, 0, 0, 0, 0x7f, 0xff, 0, 0]);
@@ -341,7 +341,7 @@ async fn an_answer_that_is_not_read_is_held_where_it_is_counted() {
     let bytes = daemon.snapshot().await.state.len();
     assert!(bytes > 80_000, "{bytes}: larger than what a connection may hold");
     // Windows that let a few bytes pass.
-    let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+    let url = format!("http://{}", daemon.running.as_ref().unwrap().address.unwrap());
     let endpoint =
         Channel::from_shared(url).unwrap().initial_stream_window_size(1).initial_connection_window_size(65_535);
     let channel = endpoint.connect().await.unwrap();

@@ -115,7 +115,7 @@ async fn the_largest_displacement_is_the_same_with_and_without_vertices() {
 async fn a_viewer_that_does_not_read_skips_and_still_ends_with_the_exact_surface() {
     let daemon = Daemon::on(kneaded_scene(8)).await;
     // A window that holds some forty updates: what the transport has taken is not skipped.
-    let url = format!("http://{}", daemon.running.as_ref().unwrap().address);
+    let url = format!("http://{}", daemon.running.as_ref().unwrap().address.unwrap());
     let endpoint = Endpoint::from_shared(url).unwrap().initial_stream_window_size(65_535);
     let mut client = SurfaceClient::new(endpoint.connect().await.unwrap());
     let request = v1::WatchRequest { max_rate_hz: 240.0, ..Default::default() };

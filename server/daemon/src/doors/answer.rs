@@ -10,23 +10,24 @@ use std::{
         atomic::{AtomicU64, Ordering},
     },
     task::{Context, Poll},
+    time::Duration,
 };
 use tokio::{sync::OwnedSemaphorePermit, time::Instant};
 
-/// Since when parts of a connection's answers have been handed to the transport that it has not asked to follow.
+/// Until when the transport has to ask for what follows those parts of a connection's answers that have been handed to it.
 #[derive(Debug, Default)]
 pub(super) struct Debts {
     next: AtomicU64,
-    since: Mutex<BTreeMap<u64, Instant>>,
+    due: Mutex<BTreeMap<u64, Instant>>,
 }
 
 impl Debts {
     fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
-        self.since.lock().unwrap_or_else(PoisonError::into_inner)
+        self.due.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Since when the oldest is.
-    pub(super) fn oldest(&self) -> Option<Instant> {
+    /// When the first of them is due.
+    pub(super) fn first(&self) -> Option<Instant> {
         self.lock().values().min().copied()
     }
 }
@@ -37,6 +38,8 @@ pub(super) struct Answer {
     place: Arc<Place>,
     debts: Arc<Debts>,
     number: u64,
+    /// How long a part may be left.
+    patience: Duration,
     body: Body,
     /// Of a part of the body, what has not been handed on.
     rest: Bytes,
@@ -58,13 +61,14 @@ impl Kept {
 
 impl Answer {
     /// A request has come.
-    pub(super) fn begin(place: &Arc<Place>, debts: &Arc<Debts>) -> Self {
+    pub(super) fn begin(place: &Arc<Place>, debts: &Arc<Debts>, patience: Duration) -> Self {
         place.begin();
         let number = debts.next.fetch_add(1, Ordering::Relaxed);
         Self {
             place: Arc::clone(place),
             debts: Arc::clone(debts),
             number,
+            patience,
             body: Body::empty(),
             rest: Bytes::new(),
             kept: Vec::new(),
@@ -79,6 +83,8 @@ impl Answer {
     /// Its answer is this.
     pub(super) fn is(mut self, body: Body) -> Self {
         self.body = body;
+        // A peer whose window has no room asks for nothing from the first.
+        self.debts.lock().insert(self.number, Instant::now() + self.patience);
         self
     }
 }
@@ -129,11 +135,11 @@ impl HttpBody for Answer {
 type Polled = Poll<Option<Result<Frame<Bytes>, axum::Error>>>;
 
 impl Answer {
-    /// Notes when a part was handed on, or that none is there.
+    /// Notes until when a part that was handed on has to be taken, or that none is there.
     fn noted(&self, polled: Polled) -> Polled {
         let mut debts = self.debts.lock();
         match &polled {
-            Poll::Ready(Some(Ok(_))) => debts.insert(self.number, Instant::now()),
+            Poll::Ready(Some(Ok(_))) => debts.insert(self.number, Instant::now() + self.patience),
             _ => debts.remove(&self.number),
         };
         drop(debts);

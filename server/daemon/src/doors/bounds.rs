@@ -21,6 +21,8 @@ pub struct Bounds {
     pub idle: Duration,
     /// How long a peer may leave a part of an answer that is there for it.
     pub mute: Duration,
+    /// The same of a device, whose commands come every tick: who takes none has no force either.
+    pub mute_device: Duration,
     /// How long headers of HTTP/1.1 may take, from the end of the request before: a connection that is kept open waits no longer.
     pub headers: Duration,
     /// How long a request may be without a further byte.
@@ -40,6 +42,7 @@ impl Default for Bounds {
             first_request: Duration::from_secs(10),
             idle: Duration::from_mins(5),
             mute: Duration::from_mins(1),
+            mute_device: Duration::from_secs(2),
             headers: Duration::from_secs(5),
             stall: Duration::from_secs(5),
             request: Duration::from_mins(1),

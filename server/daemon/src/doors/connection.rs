@@ -6,6 +6,7 @@ use super::{
     lane::{self, Arms},
     listen::{Listener, Socket},
     refusals::{Peer, Reason, Refusals},
+    tls::PeerCertificate,
     whole::{self, ATTACH},
 };
 use axum::{Router, body::Body};
@@ -162,13 +163,17 @@ impl Host {
         match (socket, &self.tls) {
             (Socket::Tcp(stream), Some(acceptor)) => {
                 match self.within(self.bounds.handshake, acceptor.accept(stream)).await {
-                    Ok(Ok(stream)) => self.attend(stream, peer, place).await,
+                    Ok(Ok(stream)) => {
+                        let shown = stream.get_ref().1.peer_certificates().and_then(|chain| chain.first());
+                        let shown = shown.map(|first| PeerCertificate(Arc::new(first.clone().into_owned())));
+                        self.attend(stream, peer, shown, place).await;
+                    }
                     Ok(Err(_)) => self.refusals.count(Reason::Handshake, Some(peer)),
                     Err(late) => self.refuse(late, Reason::Handshake, peer),
                 }
             }
-            (Socket::Tcp(stream), None) => self.attend(stream, peer, place).await,
-            (Socket::Unix(stream), _) => self.attend(stream, peer, place).await,
+            (Socket::Tcp(stream), None) => self.attend(stream, peer, None, place).await,
+            (Socket::Unix(stream), _) => self.attend(stream, peer, None, place).await,
         }
     }
 
@@ -206,13 +211,19 @@ impl Host {
         &self,
         stream: S,
         peer: Peer,
+        shown: Option<PeerCertificate>,
         place: &Arc<Place>,
     ) {
         let debts = Arc::new(Debts::default());
         let service = service_fn(|mut request: Request<Incoming>| {
             let router = self.router.clone();
-            let mut answer = Answer::begin(place, &debts);
+            let is_device = request.uri().path() == ATTACH;
+            let patience = if is_device { self.bounds.mute_device } else { self.bounds.mute };
+            let mut answer = Answer::begin(place, &debts, patience);
             request.extensions_mut().insert(peer);
+            if let Some(certificate) = &shown {
+                request.extensions_mut().insert(certificate.clone());
+            }
             let room = self.room(request.uri().path(), peer);
             async move {
                 let Some(room) = room else {
@@ -293,12 +304,12 @@ async fn overdue(place: &Place, debts: &Debts, bounds: Bounds) -> Reason {
         let now = Instant::now();
         let idle_until =
             place.idle_since().map(|since| since + if place.has_asked() { bounds.idle } else { bounds.first_request });
-        let mute_until = debts.oldest().map(|since| since + bounds.mute);
+        let mute_until = debts.first();
         match (idle_until, mute_until) {
             (Some(until), _) if until <= now => return if place.has_asked() { Reason::Idle } else { Reason::Silent },
             (_, Some(until)) if until <= now => return Reason::Mute,
             (idle, mute) => {
-                let look = now + bounds.first_request.min(bounds.mute).min(LOOK_AFTER);
+                let look = now + bounds.first_request.min(bounds.mute).min(bounds.mute_device).min(LOOK_AFTER);
                 sleep_until(idle.into_iter().chain(mute).chain([look]).min().unwrap_or(look)).await;
             }
         }

@@ -4,7 +4,7 @@ use miette::Diagnostic;
 use std::{
     fs, io,
     net::SocketAddr,
-    os::unix::fs::FileTypeExt,
+    os::unix::fs::{FileTypeExt as _, PermissionsExt as _},
     path::{Path, PathBuf},
 };
 use thiserror::Error;
@@ -44,6 +44,13 @@ pub enum ListenError {
         /// Why.
         source: io::Error,
     },
+    /// The group of the Unix socket is not known.
+    #[error("there is no group \"{group}\" on this machine")]
+    #[diagnostic(help("--unix-group takes the name or the number of a group of /etc/group"))]
+    Group {
+        /// As given.
+        group: String,
+    },
     /// A certificate or key cannot be read.
     #[error("cannot read the {what} {}", path.display())]
     #[diagnostic(help("--tls-cert and --tls-key take PEM files"))]
@@ -64,6 +71,17 @@ pub enum ListenError {
         /// Why.
         reason: String,
     },
+}
+
+/// A Unix socket, and who may open it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UnixSocket {
+    /// Where.
+    pub path: PathBuf,
+    /// Permissions, such as 0o660: who may write to it may connect.
+    pub mode: u32,
+    /// Its group; `None`: the process's own.
+    pub group: Option<String>,
 }
 
 /// A socket that is listened on.
@@ -146,17 +164,53 @@ pub async fn tcp(address: SocketAddr) -> Result<(Listener, SocketAddr), ListenEr
     Ok((Listener::Tcp(incoming), bound))
 }
 
-/// Listens on a Unix socket. A socket that nobody answers on is left over from a daemon that crashed, and replaced.
+/// Listens on a Unix socket. A socket that nobody answers on is left over from a daemon that crashed, and replaced. It gets its group
+/// and permissions beside, and then its name: nobody connects before.
 ///
 /// # Errors
-/// [`ListenError::Unix`].
-pub async fn unix(path: &Path) -> Result<Listener, ListenError> {
-    let refuse = |source| ListenError::Unix { path: path.to_owned(), source };
+/// [`ListenError::Unix`] or [`ListenError::Group`].
+pub async fn unix(socket: &UnixSocket) -> Result<Listener, ListenError> {
+    let path = &socket.path;
+    let refuse = |source| ListenError::Unix { path: path.clone(), source };
     if fs::symlink_metadata(path).is_ok_and(|meta| meta.file_type().is_socket()) {
         if UnixStream::connect(path).await.is_ok() {
             return Err(refuse(io::Error::new(io::ErrorKind::AddrInUse, "another program listens there")));
         }
         fs::remove_file(path).map_err(refuse)?;
+    } else if path.exists() {
+        return Err(refuse(io::Error::new(io::ErrorKind::AlreadyExists, "something else is there")));
     }
-    Ok(Listener::Unix(UnixListener::bind(path).map_err(refuse)?))
+    let mut beside = path.clone().into_os_string();
+    beside.push(format!(".{}", std::process::id()));
+    let beside = PathBuf::from(beside);
+    let listener = UnixListener::bind(&beside).map_err(refuse)?;
+    let named = allow(&beside, socket).and_then(|()| fs::rename(&beside, path).map_err(refuse));
+    named.inspect_err(|_| {
+        // That it cannot be removed either is no second error.
+        let _ = fs::remove_file(&beside);
+    })?;
+    Ok(Listener::Unix(listener))
+}
+
+/// Gives a socket its group and permissions.
+fn allow(at: &Path, socket: &UnixSocket) -> Result<(), ListenError> {
+    let refuse = |source| ListenError::Unix { path: socket.path.clone(), source };
+    fs::set_permissions(at, fs::Permissions::from_mode(socket.mode)).map_err(refuse)?;
+    let Some(group) = &socket.group else { return Ok(()) };
+    let number = group_number(group)?;
+    std::os::unix::fs::chown(at, None, Some(number)).map_err(refuse)
+}
+
+/// The number of a group, by its name or already one.
+fn group_number(group: &str) -> Result<u32, ListenError> {
+    if let Ok(number) = group.parse() {
+        return Ok(number);
+    }
+    // NAME:password:NUMBER:members
+    let groups = fs::read_to_string("/etc/group").unwrap_or_default();
+    let found = groups.lines().find_map(|line| {
+        let mut words = line.split(':');
+        (words.next() == Some(group)).then(|| words.nth(1)?.parse().ok()).flatten()
+    });
+    found.ok_or_else(|| ListenError::Group { group: group.to_owned() })
 }

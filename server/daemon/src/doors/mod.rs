@@ -19,9 +19,9 @@ use bounds::Bounds;
 use connection::{Host, Rooms};
 use crowd::Crowd;
 use lane::Arms;
-use listen::{ListenError, Listener};
+use listen::{ListenError, Listener, UnixSocket};
 use refusals::Refusals;
-use std::{net::SocketAddr, path::Path, sync::Arc};
+use std::{net::SocketAddr, sync::Arc};
 use tls::TlsFiles;
 use tokio::{runtime::Handle, task::JoinSet};
 use tokio_rustls::TlsAcceptor;
@@ -38,23 +38,30 @@ pub struct Routers {
 
 /// Open sockets that nobody is let in by yet.
 pub struct Doors {
-    /// Where TCP is listened on.
-    pub address: SocketAddr,
-    tcp: Listener,
+    /// Where TCP is listened on, if it is.
+    pub address: Option<SocketAddr>,
+    tcp: Option<Listener>,
     tls: Option<TlsAcceptor>,
     unix: Option<Listener>,
 }
 
 impl Doors {
-    /// Opens the sockets: TCP, with TLS or without, and a Unix socket beside.
+    /// Opens the sockets: TCP, with TLS or without, and a Unix socket.
     ///
     /// # Errors
     /// [`ListenError`].
-    pub async fn open(address: SocketAddr, tls: Option<&TlsFiles>, unix: Option<&Path>) -> Result<Self, ListenError> {
+    pub async fn open(
+        address: Option<SocketAddr>,
+        tls: Option<&TlsFiles>,
+        unix: Option<&UnixSocket>,
+    ) -> Result<Self, ListenError> {
         let tls = tls.map(tls::acceptor).transpose()?;
-        let (tcp, address) = listen::tcp(address).await?;
+        let (tcp, address) = match address {
+            Some(address) => listen::tcp(address).await.map(|(tcp, bound)| (Some(tcp), Some(bound)))?,
+            None => (None, None),
+        };
         let unix = match unix {
-            Some(path) => Some(listen::unix(path).await?),
+            Some(socket) => Some(listen::unix(socket).await?),
             None => None,
         };
         Ok(Self { address, tcp, tls, unix })
@@ -87,7 +94,9 @@ impl Doors {
             let of_arms = host(&routers.arms, &arms_crowd, None, tls.clone());
             host(&routers.all, &crowd, Some(Arc::new(Arms { handle: arms.clone(), host: of_arms })), tls)
         };
-        servers.spawn(both(self.tls).receive(self.tcp));
+        if let Some(tcp) = self.tcp {
+            servers.spawn(both(self.tls).receive(tcp));
+        }
         if let Some(unix) = self.unix {
             servers.spawn(both(None).receive(unix));
         }

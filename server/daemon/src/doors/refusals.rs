@@ -43,6 +43,8 @@ pub enum Reason {
     Idle,
     /// A web page of another, or a call that no client of gRPC makes.
     Foreign,
+    /// Who calls is not known, or may not.
+    Forbidden,
     /// A message is larger than its method's may be.
     TooLarge,
     /// A request is not one whole message.
@@ -56,7 +58,7 @@ pub enum Reason {
 }
 
 /// Every reason, with its name in counters and what it means to whoever reads the log.
-pub const REASONS: [(Reason, &str, &str); 13] = [
+pub const REASONS: [(Reason, &str, &str); 14] = [
     (
         Reason::NoDescriptor,
         "no_descriptor",
@@ -69,6 +71,7 @@ pub const REASONS: [(Reason, &str, &str); 13] = [
     (Reason::Silent, "silent", "a connection was closed, as it asked for nothing"),
     (Reason::Idle, "idle", "a connection was closed, as it had asked for nothing any more"),
     (Reason::Foreign, "foreign", "a request was refused: it came from a web page of others, or is no call of gRPC"),
+    (Reason::Forbidden, "forbidden", "a call was refused: who calls is not known, or may not"),
     (Reason::TooLarge, "too_large", "a request was refused: its message is too large"),
     (Reason::Broken, "broken", "a request was refused: it is not one whole message"),
     (Reason::TooSlow, "too_slow", "a request was refused: it did not come to its end in time"),

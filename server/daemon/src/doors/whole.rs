@@ -76,7 +76,7 @@ fn is_streamed(path: &str) -> bool {
 }
 
 /// An answer without a message, of the kind that was asked for.
-pub(super) fn refused(status: &Status, asked: &HeaderMap) -> Response {
+pub fn refused(status: &Status, asked: &HeaderMap) -> Response {
     let mut response = status.clone().into_http::<Body>();
     let kind = asked.get(CONTENT_TYPE).cloned();
     response.headers_mut().insert(CONTENT_TYPE, kind.unwrap_or(HeaderValue::from_static("application/grpc")));

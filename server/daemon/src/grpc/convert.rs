@@ -158,8 +158,23 @@ pub fn device_hello(message: Option<v1::DeviceUp>) -> Result<v1::DeviceHello, St
         let value = hello.max_torque_nm;
         return Err(Status::invalid_argument(format!("hello.max_torque_nm = {value} must be finite and not negative")));
     }
+    let patience = [
+        ("sample_rate_hz", hello.sample_rate_hz, SAMPLE_RATES_HZ, "the usual one, 1000"),
+        ("pose_valid_for_s", hello.pose_valid_for_s, POSE_VALID_FOR_S, "as the daemon has it"),
+    ];
+    for (name, value, (least, most), usual) in patience {
+        if value != 0.0 && !(least..=most).contains(&value) {
+            let rule = format!("hello.{name} = {value} must be 0 ({usual}), or {least} to {most}");
+            return Err(Status::invalid_argument(rule));
+        }
+    }
     Ok(hello)
 }
+
+/// How often a device may say that it sends (Hz).
+const SAMPLE_RATES_HZ: (f64, f64) = (10.0, 1e5);
+/// How long it may let a pose be used (s).
+const POSE_VALID_FOR_S: (f64, f64) = (1e-3, 0.5);
 
 /// The rate (Hz) and what is wanted beside numbers.
 ///
@@ -195,7 +210,11 @@ pub fn watch_request(request: &v1::WatchRequest, display_rate_hz: f64) -> Result
 ///
 /// # Errors
 /// `INVALID_ARGUMENT`, naming the force.
-pub fn injections(session: &ActiveSession, forces: &[v1::InjectedForce]) -> Result<Vec<Injection>, Status> {
+pub fn injections(
+    session: &ActiveSession,
+    forces: &[v1::InjectedForce],
+    is_bounded: bool,
+) -> Result<Vec<Injection>, Status> {
     if forces.len() > MAX_FORCES {
         return Err(Status::invalid_argument(format!("{} forces in one request; at most {MAX_FORCES}", forces.len())));
     }
@@ -222,7 +241,7 @@ pub fn injections(session: &ActiveSession, forces: &[v1::InjectedForce]) -> Resu
         if force.tick_count > MAX_INJECTED_TICKS {
             return Err(refuse(index, format!("tick_count = {} is more than {MAX_INJECTED_TICKS}", force.tick_count)));
         }
-        Ok(Injection { node, force_n, from_tick: force.from_tick, tick_count: force.tick_count })
+        Ok(Injection { node, force_n, from_tick: force.from_tick, tick_count: force.tick_count, is_bounded })
     };
     forces.iter().enumerate().map(convert).collect()
 }

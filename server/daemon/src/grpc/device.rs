@@ -4,7 +4,10 @@ use super::{
     convert,
     downlink::{Attachment, Taken},
 };
-use crate::session::{ActiveSession, Daemon, DeviceRecord, ToolSeat};
+use crate::{
+    session::{ActiveSession, Daemon, DeviceRecord, Dismissal, ToolSeat},
+    who::gate::Expiry,
+};
 use futures_util::{Stream, stream};
 use palpate_physics::contact::Coupling;
 use palpate_proto::v1::{self, device_down::Message, device_server::Device};
@@ -27,20 +30,21 @@ impl Device for DeviceService {
     type AttachStream = Pin<Box<dyn Stream<Item = Result<v1::DeviceDown, Status>> + Send>>;
 
     async fn attach(&self, request: Request<Streaming<v1::DeviceUp>>) -> Result<Response<Self::AttachStream>, Status> {
-        let start = Phase::Hello(Arc::clone(&self.daemon), Box::new(request.into_inner()));
+        let expiry = request.extensions().get::<Expiry>().cloned();
+        let start = Phase::Hello(Arc::clone(&self.daemon), Box::new(request.into_inner()), expiry);
         Ok(Response::new(Box::pin(stream::unfold(start, next))))
     }
 }
 
 enum Phase {
-    Hello(Arc<Daemon>, Box<Streaming<v1::DeviceUp>>),
+    Hello(Arc<Daemon>, Box<Streaming<v1::DeviceUp>>, Option<Expiry>),
     Live(Box<Attachment>),
     Over,
 }
 
 async fn next(phase: Phase) -> Option<(Result<v1::DeviceDown, Status>, Phase)> {
     let (result, phase) = match phase {
-        Phase::Hello(daemon, messages) => match begin(daemon, *messages).await {
+        Phase::Hello(daemon, messages, expiry) => match begin(daemon, *messages, expiry).await {
             Ok((welcome, attachment)) => (Ok(Message::Welcome(welcome)), Phase::Live(Box::new(attachment))),
             Err(status) => (Err(status), Phase::Over),
         },
@@ -57,6 +61,7 @@ async fn next(phase: Phase) -> Option<(Result<v1::DeviceDown, Status>, Phase)> {
 async fn begin(
     daemon: Arc<Daemon>,
     mut messages: Streaming<v1::DeviceUp>,
+    expiry: Option<Expiry>,
 ) -> Result<(v1::DeviceWelcome, Attachment), Status> {
     let stop = daemon.stop.clone();
     let first = tokio::select! {
@@ -75,15 +80,56 @@ async fn begin(
     let record = DeviceRecord::new(hello.device_name.clone());
     let seat = &session.tools[tool];
     let end = seat.take(&record).ok_or_else(|| taken(seat))?;
+    if let Some(Expiry(expired)) = expiry {
+        let device = Arc::clone(&record);
+        tokio::spawn(async move {
+            tokio::select! {
+                () = expired.cancelled() => device.dismiss(Dismissal::Expired),
+                () = device.gone() => {}
+            }
+        });
+    }
     let attachment = daemon.numbers.next_attachment();
     let max_force_n = hello.max_force_n.min(daemon.settings.limits.force.max_force_n);
     let max_torque_nm = hello.max_torque_nm.min(daemon.settings.limits.torque.max_torque_nm);
+    let tick_period_s = session.model.settings().tick_period_s;
+    let patience = Patience::of(&hello, daemon.settings.limits.watchdog.stale_after_s, tick_period_s);
     end.shared.set_max_torque_nm(max_torque_nm);
+    end.shared.set_stale_after_s(patience.stale_after_s);
     end.shared.attach(attachment, max_force_n);
-    let welcome = welcome(&daemon, &session, tool, (max_force_n, max_torque_nm));
+    let welcome = welcome(&daemon, &session, tool, (max_force_n, max_torque_nm), patience);
     tracing::info!(device = hello.device_name, tool = seat.name, "device attached");
-    let taken = Taken { session, tool, number: attachment, record, end };
+    let lease = Duration::from_secs_f64(patience.lease_s);
+    let taken = Taken { session, tool, number: attachment, record, end, lease };
     Ok((welcome, Attachment::live(daemon, taken, messages)))
+}
+
+/// A device that sends at least so often may be silent for so long before its tool is taken.
+const SHORTEST_LEASE_S: f64 = 0.2;
+/// A slower one, for so many of its samples, or so many ticks.
+const LEASE_PERIODS: f64 = 5.0;
+/// How often a device sends that does not say so (Hz).
+const USUAL_RATE_HZ: f64 = 1e3;
+
+/// How long a device may be silent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Patience {
+    /// Before its force goes (s).
+    stale_after_s: f64,
+    /// Before its tool goes (s).
+    lease_s: f64,
+}
+
+impl Patience {
+    /// What it says of itself, beside the daemon's own patience.
+    fn of(hello: &v1::DeviceHello, own_stale_after_s: f64, tick_period_s: f64) -> Self {
+        let said = |value: f64, usual: f64| if value > 0.0 { value } else { usual };
+        let period_s = said(hello.sample_rate_hz, USUAL_RATE_HZ).recip();
+        Self {
+            stale_after_s: said(hello.pose_valid_for_s, own_stale_after_s.max(2.0 * period_s)),
+            lease_s: SHORTEST_LEASE_S.max(LEASE_PERIODS * period_s.max(tick_period_s)),
+        }
+    }
 }
 
 /// The tool by name, or the first that the scene leaves to a device.
@@ -114,6 +160,7 @@ fn welcome(
     session: &ActiveSession,
     tool: usize,
     (max_force_n, max_torque_nm): (f64, f64),
+    patience: Patience,
 ) -> v1::DeviceWelcome {
     let spec = &session.model.tools()[tool];
     let (stiffness, damping) = match spec.coupling {
@@ -130,10 +177,11 @@ fn welcome(
             max_force_rate_n_per_s: limits.force.max_force_rate_n_per_s,
             coupling_stiffness_n_per_m: stiffness,
             coupling_damping_n_s_per_m: damping,
-            stale_after_s: limits.watchdog.stale_after_s,
+            stale_after_s: patience.stale_after_s,
             ramp_to_zero_s: limits.watchdog.ramp_to_zero_s,
             max_torque_nm,
             max_torque_rate_nm_per_s: limits.torque.max_torque_rate_nm_per_s,
+            lease_s: patience.lease_s,
         }),
         tool_radius_m: spec.radius_m,
         tool_half_length_m: spec.shape.half_length_m(),

@@ -6,7 +6,7 @@ use super::{
     uplink::{Ended, FAULTS_WAITING, Lent, Uplink},
 };
 use crate::{
-    session::{ActiveSession, Daemon, DeviceRecord},
+    session::{ActiveSession, Daemon, DeviceRecord, Dismissal},
     sim::exchange::{DeviceInput, ToolEnd, ToolOutput},
 };
 use glam::DVec3;
@@ -40,6 +40,37 @@ pub struct Taken {
     pub record: Arc<DeviceRecord>,
     /// Its end.
     pub end: ToolEnd,
+    /// Time without a sample after which it is taken from the device.
+    pub lease: Duration,
+}
+
+/// What a device is told when the daemon ends its attachment.
+#[derive(Debug, Clone, Copy)]
+struct Goodbye {
+    code: DeviceFaultCode,
+    why: &'static str,
+}
+
+impl Goodbye {
+    const fn detached(why: &'static str) -> Self {
+        Self { code: DeviceFaultCode::Detached, why }
+    }
+
+    const fn to(dismissed: Dismissal) -> Self {
+        match dismissed {
+            Dismissal::Silent => Self::detached(
+                "no sample has come for the time of the lease, and others may take the tool: attach again",
+            ),
+            Dismissal::Expired => Self {
+                code: DeviceFaultCode::Dismissed,
+                why: "what this device was issued has ended or was revoked: it needs another certificate or token",
+            },
+            Dismissal::Ordered => Self {
+                code: DeviceFaultCode::Dismissed,
+                why: "the tool was taken from this device by an order (`palpate-view detach`)",
+            },
+        }
+    }
 }
 
 /// A device on its tool.
@@ -70,12 +101,12 @@ enum Stage {
     Live,
     /// The daemon ends it: the loop's commands go on until one carries zero force.
     Releasing {
-        why: &'static str,
+        why: Goodbye,
         until: Instant,
     },
     /// The loop does not bring the force (N) to zero: the stream does, since then.
     Fading {
-        why: &'static str,
+        why: Goodbye,
         from_n: DVec3,
         from_nm: DVec3,
         since: Instant,
@@ -88,13 +119,13 @@ enum End {
     /// The device.
     WayUp,
     /// The daemon, and why.
-    Daemon(&'static str),
+    Daemon(Goodbye),
 }
 
 impl Attachment {
     /// Begins both ways.
     pub fn live(daemon: Arc<Daemon>, taken: Taken, messages: Streaming<v1::DeviceUp>) -> Self {
-        let Taken { session, tool, number, record, end } = taken;
+        let Taken { session, tool, number, record, end, lease } = taken;
         let over = CancellationToken::new();
         let (fault_in, faults) = mpsc::channel(FAULTS_WAITING);
         // The way up has the real slot; what stands in its place is never read.
@@ -110,6 +141,7 @@ impl Attachment {
             daemon: Arc::clone(&daemon),
             faults: fault_in,
             over: over.clone(),
+            lease,
         };
         let uplink = tokio::spawn(uplink.run(over.clone().drop_guard()));
         Self {
@@ -156,6 +188,8 @@ impl Attachment {
     async fn next_of_live(&mut self) -> Result<Message, End> {
         let (stop, replaced) = (self.daemon.stop.clone(), self.session.ended.clone());
         let (over, loop_gone) = (self.over.clone(), self.daemon.sign.gone());
+        let record = Arc::clone(&self.record);
+        let ends = |why| Err(End::Daemon(Goodbye::detached(why)));
         loop {
             if let Some(fault) = self.untold.and_then(|output| self.news.of(&output, Instant::now().into_std())) {
                 return Ok(Message::Fault(fault));
@@ -164,12 +198,13 @@ impl Attachment {
             let Some(end) = self.end.as_mut() else { return Err(End::WayUp) };
             tokio::select! {
                 biased;
-                () = loop_gone.cancelled() => return Err(End::Daemon(self.why_the_loop_is_gone())),
-                () = stop.cancelled() => return Err(End::Daemon("the daemon is shutting down")),
-                () = replaced.cancelled() => return Err(End::Daemon("another scene was loaded: attach again")),
+                () = loop_gone.cancelled() => return ends(self.why_the_loop_is_gone()),
+                () = stop.cancelled() => return ends("the daemon is shutting down"),
+                () = replaced.cancelled() => return ends("another scene was loaded: attach again"),
+                dismissed = record.dismissed() => return Err(End::Daemon(Goodbye::to(dismissed))),
                 () = over.cancelled() => return Err(End::WayUp),
                 // Before faults: a device whose samples are refused faster than it reads would hear of nothing else.
-                rung = end.ear.rung() => if rung.is_err() { return Err(End::Daemon("the simulation loop cannot be heard")) },
+                rung = end.ear.rung() => if rung.is_err() { return ends("the simulation loop cannot be heard") },
                 fault = self.faults.recv() => if let Some(fault) = fault { return Ok(Message::Fault(fault)) },
             }
             if let Some(output) = self.newest() {
@@ -232,11 +267,11 @@ impl Attachment {
     }
 
     /// The last force, ramped to zero over the time the loop takes for it; then the goodbye.
-    async fn fade(&mut self, why: &str, (from_n, from_nm): (DVec3, DVec3), since: Instant) -> Message {
+    async fn fade(&mut self, goodbye: Goodbye, (from_n, from_nm): (DVec3, DVec3), since: Instant) -> Message {
         if (self.sent.force_n, self.sent.torque_nm) == (DVec3::ZERO, DVec3::ZERO) {
             self.stage = Stage::Ended;
-            let text = format!("{why}; the force has been ramped to zero");
-            return Message::Fault(fault(DeviceFaultCode::Detached, text, 1));
+            let text = format!("{}; the force has been ramped to zero", goodbye.why);
+            return Message::Fault(fault(goodbye.code, text, 1));
         }
         sleep(FADE_STEP).await;
         let ramp_s = self.daemon.settings.limits.watchdog.ramp_to_zero_s;

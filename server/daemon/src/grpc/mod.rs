@@ -1,5 +1,6 @@
 //! The services of `palpate.v1`, beside health, reflection and the page, on one port.
 pub mod convert;
+pub mod detach;
 pub mod device;
 pub mod downlink;
 pub mod news;
@@ -16,6 +17,7 @@ use crate::{
     },
     page,
     session::{ActiveSession, Daemon},
+    who,
 };
 use palpate_proto::{
     DESCRIPTOR_SET, MAX_SNAPSHOT_BYTES,
@@ -43,6 +45,7 @@ pub async fn routes(
     daemon: &Arc<Daemon>,
     gate: Gate,
     guard: Guard,
+    known: who::gate::Gate,
 ) -> Result<(Routers, HealthReporter), ReflectionError> {
     let web = GrpcWebLayer::new();
     let device = DeviceServer::new(device::DeviceService { daemon: Arc::clone(daemon) })
@@ -61,7 +64,9 @@ pub async fn routes(
             .register_encoded_file_descriptor_set(DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
-    let arms = Routes::new(device.clone()).into_axum_router();
+    let arms = Routes::new(device.clone())
+        .into_axum_router()
+        .layer(axum::middleware::from_fn_with_state(known.clone(), who::gate::pass));
     let all = Routes::new(web.layer(device))
         .add_service(web.layer(surface))
         .add_service(web.layer(session))
@@ -71,6 +76,8 @@ pub async fn routes(
         .into_axum_router()
         .fallback(page_or_unimplemented)
         .layer(axum::middleware::from_fn_with_state(gate, whole::take))
+        // Nothing of a request is read before it is known who sends it.
+        .layer(axum::middleware::from_fn_with_state(known, who::gate::pass))
         // Asked first: layers are put around what is there.
         .layer(axum::middleware::from_fn_with_state(guard, origin::check));
     Ok((Routers { all, arms }, health))

@@ -14,15 +14,16 @@ pub struct News {
     quarantined: Option<u64>,
     held: bool,
     stale: bool,
+    let_go: bool,
     /// When limiting was told last, and in how many ticks the force had been limited then.
     limited: Option<(Instant, u64)>,
-    counts: [u64; 3],
+    counts: [u64; 4],
 }
 
 impl News {
     /// For a device under these limits that was told nothing yet.
     pub fn new(limits: ForceLimits) -> Self {
-        Self { limits, quarantined: None, held: false, stale: false, limited: None, counts: [0; 3] }
+        Self { limits, quarantined: None, held: false, stale: false, let_go: false, limited: None, counts: [0; 4] }
     }
 
     /// The next thing that an output tells and the device does not know; `None` when it knows all.
@@ -48,6 +49,14 @@ impl News {
             if output.stale {
                 let text = "no fresh sample: the force ramps to zero until samples come again";
                 return Some(self.count(2, DeviceFaultCode::Stale, text.to_owned()));
+            }
+        }
+        if output.let_go != self.let_go {
+            self.let_go = output.let_go;
+            if output.let_go {
+                let text =
+                    "the button that the force depends on is not held: hold it, and the force rises (--hold-to-run)";
+                return Some(self.count(3, DeviceFaultCode::NotHeld, text.to_owned()));
             }
         }
         self.limiting(output.limited, now)
@@ -82,7 +91,7 @@ pub fn fault(code: DeviceFaultCode, message: String, count: u64) -> DeviceFault 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use DeviceFaultCode::{Held, Limited, Quarantined, Stale};
+    use DeviceFaultCode::{Held, Limited, NotHeld, Quarantined, Stale};
 
     const LIMITS: ForceLimits = ForceLimits { max_force_n: 3.0, max_force_rate_n_per_s: 2000.0 };
 
@@ -94,9 +103,9 @@ mod tests {
     fn each_change_is_told_once_and_counted() {
         let (mut news, now) = (News::new(LIMITS), Instant::now());
         let fine = ToolOutput::default();
-        let bad = ToolOutput { quarantined: Some(7), held: true, stale: true, ..fine };
+        let bad = ToolOutput { quarantined: Some(7), held: true, stale: true, let_go: true, ..fine };
         assert_eq!(told(&mut news, &fine, now), []);
-        assert_eq!(told(&mut news, &bad, now), [(Quarantined, 1), (Held, 1), (Stale, 1)]);
+        assert_eq!(told(&mut news, &bad, now), [(Quarantined, 1), (Held, 1), (Stale, 1), (NotHeld, 1)]);
         assert_eq!(told(&mut news, &bad, now), []);
         assert_eq!(told(&mut news, &fine, now), []);
         assert_eq!(told(&mut news, &ToolOutput { stale: true, ..fine }, now), [(Stale, 2)]);

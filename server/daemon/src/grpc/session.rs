@@ -1,15 +1,17 @@
 //! `palpate.v1.Session`.
-use super::{convert, current_session};
+use super::{convert, current_session, detach};
 use crate::{
     doors::{answer::Kept, refusals::Peer},
+    kept::folder::Slot,
     load,
-    session::{ActiveSession, Daemon, prepare},
+    session::{ActiveSession, Daemon, Dismissal, prepare},
     sim::{
         command::{Copy, Done, Refusal, Request as Order},
         inject::InjectRefusal,
     },
     sparing::Sparing,
     status,
+    who::{keeper::Caller, role::Role},
 };
 use palpate_physics::snapshot;
 use palpate_proto::{
@@ -38,14 +40,21 @@ pub struct Said {
     restore: Sparing,
     step: Sparing,
     inject: Sparing,
+    detach: Sparing,
 }
 
 /// Says who gave an order; `times`: such orders since the last line.
 fn say<M>(line: &Sparing, request: &Request<M>, order: &'static str) {
     line.say(|times| {
         let peer = request.extensions().get::<Peer>().map(ToString::to_string);
-        tracing::info!(peer, order, times, "an order has come");
+        let who = caller(request);
+        tracing::info!(peer, who = who.name(), order, times, "an order has come");
     });
+}
+
+/// Who gave it: nobody that is known, where the gate did not say.
+fn caller<M>(request: &Request<M>) -> Caller {
+    request.extensions().get::<Caller>().cloned().unwrap_or(Caller::Unknown)
 }
 
 /// A refusal as gRPC tells it.
@@ -79,21 +88,11 @@ impl SessionService {
         }
     }
 
-    /// Waits for room for one more state beside the running one.
-    async fn room(&self) -> Result<OwnedSemaphorePermit, Status> {
-        let room = Arc::clone(&self.daemon.room_for_states).acquire_owned().await;
-        room.map_err(|_| refused(Refusal::Stopping))
-    }
-
-    /// A copy of the state, with its room. The room is taken before the memory is, and goes with it: a caller that goes away while
-    /// memory is being got frees neither.
+    /// A copy of the state, with its room, while the daemon does not stop.
     async fn copy(&self, session: &ActiveSession) -> Result<(Box<Copy>, Done, OwnedSemaphorePermit), Status> {
-        let (room, model) = (self.room().await?, Arc::clone(&session.model));
-        let empty = move || (Copy::of(&model), room);
-        let (copy, room) = blocking(empty).await?;
-        match self.order(session, Order::Copy(Box::new(copy))).await? {
-            (Order::Copy(copy), done) => Ok((copy, done, room)),
-            _ => Err(Status::internal("the loop answered another order")),
+        tokio::select! {
+            copied = self.daemon.copy(session) => copied.map_err(refused),
+            () = self.daemon.stop.cancelled() => Err(refused(Refusal::Stopping)),
         }
     }
 
@@ -125,12 +124,15 @@ fn unexpected() -> Status {
 async fn replace_scene(daemon: &Arc<Daemon>, source: WireSource) -> Result<Arc<ActiveSession>, Status> {
     let builder = Arc::clone(daemon);
     let prepared = tokio::task::spawn_blocking(move || {
-        let scene = load::from_wire(source, &builder.settings.scene_folders)?;
-        prepare(scene, &builder.settings, &builder.numbers, &builder.hub, &mut |_| ())
+        let (scene, source) = load::from_wire(source, &builder.settings.scene_folders)?;
+        prepare((scene, Some(source)), &builder.settings, &builder.numbers, &builder.hub, &mut |_| ())
             .map_err(|error| Status::invalid_argument(error.to_string()))
     })
     .await
     .map_err(|_| unexpected())??;
+    if let Some(autosave) = &daemon.autosave {
+        autosave.keep(daemon, Slot::Replaced).await;
+    }
     daemon.replace(prepared).await.map_err(refused)
 }
 
@@ -167,6 +169,16 @@ impl Session for SessionService {
         let session = current_session(&self.daemon, &request.into_inner().session_id)?;
         let (_, done) = self.order(&session, Order::Reset).await?;
         Ok(Response::new(v1::ResetResponse { tick: done.tick }))
+    }
+
+    async fn detach(&self, request: Request<v1::DetachRequest>) -> Result<Response<v1::DetachResponse>, Status> {
+        say(&self.said.detach, &request, "detach");
+        let request = request.into_inner();
+        let session = current_session(&self.daemon, &request.session_id)?;
+        let (tool, device) = detach::driven(&session, &request.tool_name)?;
+        device.dismiss(Dismissal::Ordered);
+        detach::until_gone(&device).await?;
+        Ok(Response::new(v1::DetachResponse { device_name: device.name.clone(), tool_name: tool.to_owned() }))
     }
 
     async fn pause(&self, request: Request<v1::PauseRequest>) -> Result<Response<v1::PauseResponse>, Status> {
@@ -214,7 +226,7 @@ impl Session for SessionService {
         say(&self.said.restore, &request, "restore");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
-        let (room, model) = (self.room().await?, Arc::clone(&session.model));
+        let (room, model) = (self.daemon.room().await.map_err(refused)?, Arc::clone(&session.model));
         let read = move || {
             let read = snapshot::restore(&model, &request.state);
             read.map(|state| (snapshot::state_hash(&state), state, room))
@@ -231,9 +243,10 @@ impl Session for SessionService {
         request: Request<v1::InjectForcesRequest>,
     ) -> Result<Response<v1::InjectForcesResponse>, Status> {
         say(&self.said.inject, &request, "inject forces");
+        let is_bounded = !caller(&request).roles().has(Role::Operator);
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
-        let forces = convert::injections(&session, &request.forces)?;
+        let forces = convert::injections(&session, &request.forces, is_bounded)?;
         let (_, done) = self.order(&session, Order::Inject(forces)).await?;
         Ok(Response::new(v1::InjectForcesResponse { first_tick: done.first_tick, pending: done.pending }))
     }

@@ -1,7 +1,7 @@
 //! A device's way up: every sample is checked, the newest goes into the loop's slot, what is wrong goes back as a fault.
 use super::convert::{self, Rejected};
 use crate::{
-    session::{Daemon, DeviceRecord},
+    session::{Daemon, DeviceRecord, Dismissal},
     sim::exchange::DeviceInput,
 };
 use palpate_proto::v1::{self, DeviceFaultCode, device_up::Message};
@@ -9,8 +9,12 @@ use palpate_realtime::Clock;
 use std::{
     collections::BTreeMap,
     sync::{Arc, atomic::Ordering},
+    time::Duration,
 };
-use tokio::sync::{mpsc, oneshot};
+use tokio::{
+    sync::{mpsc, oneshot},
+    time::{Instant, MissedTickBehavior, interval_at},
+};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::{Status, Streaming};
 use triple_buffer::Input;
@@ -65,6 +69,32 @@ pub struct Uplink {
     pub faults: mpsc::Sender<v1::DeviceFault>,
     /// Cancelled when either way ends.
     pub over: CancellationToken,
+    /// Time without a sample after which the tool is taken from the device.
+    pub lease: Duration,
+}
+
+/// In so many looks without a sample a lease ends. A daemon that stands still itself for a while looks once meanwhile, and takes no
+/// tool from a device whose samples were there, unread.
+const LOOKS: u32 = 10;
+
+/// How long a device has been silent.
+#[derive(Debug)]
+struct Silence {
+    accepted: u64,
+    looks: u32,
+}
+
+impl Silence {
+    fn new() -> Self {
+        Self { accepted: 0, looks: 0 }
+    }
+
+    /// Whether it has been silent for the time of its lease, `accepted` being the number of its samples so far.
+    fn look(&mut self, accepted: u64) -> bool {
+        self.looks = if accepted == self.accepted { self.looks + 1 } else { 0 };
+        self.accepted = accepted;
+        self.looks >= LOOKS
+    }
 }
 
 /// How the way up ended.
@@ -76,10 +106,19 @@ impl Uplink {
         let mut last_sequence = None;
         let mut counts: BTreeMap<i32, u64> = BTreeMap::new();
         let over = self.over.clone();
+        let mut silence = Silence::new();
+        let mut looks = interval_at(Instant::now() + self.lease / LOOKS, self.lease / LOOKS);
+        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             let message = tokio::select! {
                 () = over.cancelled() => return Ok(()),
                 message = self.messages.message() => message,
+                _ = looks.tick() => {
+                    if silence.look(self.record.accepted.load(Ordering::Relaxed)) {
+                        self.record.dismiss(Dismissal::Silent);
+                    }
+                    continue;
+                }
             };
             let up = match message {
                 Ok(Some(up)) => up,
@@ -118,5 +157,21 @@ impl Uplink {
         // A full queue drops the fault: the count of the next one tells.
         let _ =
             self.faults.try_send(v1::DeviceFault { code, message: rejected.message, sample_sequence, count: *count });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_silence_of_the_whole_lease_ends_it() {
+        let mut silence = Silence::new();
+        let mut looks = |accepted: u64, times: u32| (0..times).any(|_| silence.look(accepted));
+        // A device that has said hello and nothing else has as long as any other.
+        assert!(!looks(0, LOOKS - 1));
+        assert!(!looks(1, LOOKS));
+        assert!(!looks(2, LOOKS));
+        assert!(looks(2, 1));
     }
 }

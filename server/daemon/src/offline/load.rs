@@ -24,9 +24,9 @@ pub(super) struct Refused {
 /// Loads a scene with a progress bar.
 pub(super) fn load_scene(name: &str) -> miette::Result<Scene> {
     let mut bar = Progress::new(name);
-    let scene = from_argument(name, &mut |fraction, what| bar.show(fraction, what));
+    let loaded = from_argument(name, &mut |fraction, what| bar.show(fraction, what));
     bar.finish();
-    scene
+    loaded.map(|(scene, _)| scene)
 }
 
 /// Loads a scene; its warnings go to standard error.

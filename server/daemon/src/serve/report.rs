@@ -51,22 +51,41 @@ pub fn startup(running: &Running, config: &ServeConfig, description: &str) -> St
     for warning in &session.warnings {
         let _ = writeln!(text, "warning    {warning}");
     }
-    let scheme = if config.tls.is_some() { "https" } else { "http" };
-    let url = format!("{scheme}://{}", here(running.address));
-    let _ = writeln!(text, "page       {url}/");
-    if running.address.ip().is_unspecified() {
-        let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
-        let port = running.address.port();
-        let _ =
-            writeln!(text, "elsewhere  {scheme}://{name}:{port}/ or an address of this machine, where others know it");
+    if let Some(address) = running.address {
+        reached_by_tcp(&mut text, address, config);
     }
-    let _ = writeln!(text, "arms       palpate-bridge --server {url}");
-    let _ = writeln!(text, "viewers    palpate-view --server {url} status");
-    if let Some(path) = &config.unix {
-        let _ = writeln!(text, "unix       unix://{}", path.display());
+    if let Some(socket) = &config.unix {
+        let group = socket.group.as_ref().map(|group| format!(", group {group}")).unwrap_or_default();
+        let _ = writeln!(text, "unix       unix://{} (permissions {:04o}{group})", socket.path.display(), socket.mode);
     }
     let _ = write!(text, "stop       Ctrl-C (forces ramp to zero first)");
     text
+}
+
+fn reached_by_tcp(text: &mut String, address: SocketAddr, config: &ServeConfig) {
+    let scheme = if config.tls.is_some() { "https" } else { "http" };
+    let url = format!("{scheme}://{}", here(address));
+    let _ = writeln!(text, "page       {url}/");
+    if address.ip().is_unspecified() {
+        let name = rustix::system::uname().nodename().to_string_lossy().into_owned();
+        let port = address.port();
+        let _ =
+            writeln!(text, "elsewhere  {scheme}://{name}:{port}/ or an address of this machine, where others know it");
+    }
+    let shown = match &config.keys {
+        Some(keys) => {
+            format!(" --tls-ca {} --tls-cert NAME.pem --tls-key NAME.key", keys.authority().display())
+        }
+        None => String::new(),
+    };
+    let _ = writeln!(text, "arms       palpate-bridge --server {url}{shown}");
+    let _ = writeln!(text, "viewers    palpate-view --server {url}{shown} status");
+    let callers = match (&config.keys, config.trusts_network) {
+        (Some(_), _) => "are asked who they are: `palpated pki issue` and `palpated pki token` tell them apart",
+        (None, true) => "are trusted, whoever they are (--trust-the-network)",
+        (None, false) => return,
+    };
+    let _ = writeln!(text, "callers    {callers}");
 }
 
 /// The address as one of this machine reaches it: no address at all means every one.

@@ -1,10 +1,18 @@
 //! The process: load, start, tell, wait for a signal, say goodbye.
 use super::{Runner, ServeConfig, ServeError, args::ServeArgs, report, start_with};
-use crate::{doors::descriptors, load, progress::Progress, sim::thread::Loop, telemetry};
+use crate::{
+    doors::descriptors,
+    kept::folder::Slot,
+    load,
+    progress::Progress,
+    sim::thread::Loop,
+    telemetry::{self, causes},
+    who::keeper::Keeper,
+};
 use miette::IntoDiagnostic;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
-use std::{io::Write as _, process::ExitCode};
+use std::{io::Write as _, process::ExitCode, sync::Arc};
 use tokio::{
     runtime,
     signal::unix::{Signal, SignalKind, signal},
@@ -28,9 +36,20 @@ pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     let mut config = args.config()?;
     config.bounds.connections = config.bounds.connections.min(descriptors::raise());
     let mut bar = Progress::new(&args.scene);
-    let scene = load::from_argument(&args.scene, &mut |fraction, what| bar.show(fraction, what));
+    if let Some(autosave) = &config.autosave {
+        autosave.folder.prepare()?;
+        if args.resume {
+            config.resume = autosave.folder.read(Slot::Newest)?;
+        }
+    }
+    let mut show = |fraction: f64, what: &str| bar.show(fraction, what);
+    let loaded = match &config.resume {
+        Some(kept) => load::from_kept(&kept.source, &mut show).map(|scene| (scene, kept.source.clone())),
+        None => load::from_argument(&args.scene, &mut show),
+    };
     bar.finish();
-    let scene = scene?;
+    let (scene, source) = loaded?;
+    config.source = Some(source);
     let runtime = runtime::Builder::new_multi_thread().enable_all().build().into_diagnostic()?;
     let code = runtime.block_on(serve(config, scene, runner))?;
     // What still hangs on a socket is not waited for.
@@ -47,8 +66,9 @@ async fn serve(config: ServeConfig, scene: Scene, runner: Runner) -> Result<Exit
     let _ = writeln!(std::io::stdout(), "{}", report::startup(&running, &config, &description));
     notify(&[NotifyState::Ready]);
     let told = stop.clone();
+    let keeper = Arc::clone(&running.keeper);
     tokio::spawn(async move {
-        signals.first().await;
+        signals.first(|| reload(&keeper)).await;
         told.cancel();
         let _ = writeln!(std::io::stderr(), "stopping: forces ramp to zero");
         notify(&[NotifyState::Stopping]);
@@ -65,6 +85,14 @@ async fn serve(config: ServeConfig, scene: Scene, runner: Runner) -> Result<Exit
     Ok(ExitCode::SUCCESS)
 }
 
+/// Reads again what may change while the daemon runs.
+fn reload(keeper: &Keeper) {
+    match keeper.reload() {
+        Ok(()) => tracing::info!("keys and revoked names are read again"),
+        Err(error) => tracing::error!(error = causes(&error), "keys cannot be read again: those of before stay"),
+    }
+}
+
 /// Tells systemd, if it is there.
 fn notify(states: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
@@ -75,17 +103,26 @@ fn notify(states: &[NotifyState<'_>]) {
 struct Signals {
     terminate: Signal,
     interrupt: Signal,
+    hangup: Signal,
 }
 
 impl Signals {
     fn new() -> std::io::Result<Self> {
-        Ok(Self { terminate: signal(SignalKind::terminate())?, interrupt: signal(SignalKind::interrupt())? })
+        Ok(Self {
+            terminate: signal(SignalKind::terminate())?,
+            interrupt: signal(SignalKind::interrupt())?,
+            hangup: signal(SignalKind::hangup())?,
+        })
     }
 
-    async fn first(mut self) {
-        tokio::select! {
-            _ = self.terminate.recv() => {}
-            _ = self.interrupt.recv() => {}
+    /// Waits for one that ends the daemon; others ask it to `reload`.
+    async fn first(mut self, reload: impl Fn()) {
+        loop {
+            tokio::select! {
+                _ = self.terminate.recv() => return,
+                _ = self.interrupt.recv() => return,
+                _ = self.hangup.recv() => reload(),
+            }
         }
     }
 }

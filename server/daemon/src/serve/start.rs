@@ -3,6 +3,7 @@ use super::{ServeConfig, ServeError};
 use crate::{
     doors::{Doors, lane::Lane, origin::Guard, whole::Gate},
     grpc,
+    kept::{autosave::Autosave, folder::Kept},
     progress::{BUILDING, Progress},
     session::{Daemon, Numbers, Prepared, SessionSettings, prepare},
     sim::{
@@ -12,7 +13,9 @@ use crate::{
         timing::Timing,
     },
     stream::hub::Hub,
+    who::{self, keeper::Keeper},
 };
+use palpate_physics::snapshot;
 use palpate_realtime::{Clock, Note, OsMeasures, TickLoop};
 use palpate_scene::Scene;
 use std::{
@@ -30,18 +33,22 @@ use tokio_util::sync::CancellationToken;
 
 /// States that requests may hold beside the running one: copies for status and snapshots, and restored ones.
 const MOST_STATES: usize = 8;
+/// How long the last copy of the session may take.
+const LAST_COPY_WITHIN: Duration = Duration::from_millis(100);
 /// How long open streams may take to end once forces are zero.
 const STREAMS_END_WITHIN: Duration = Duration::from_secs(2);
 
 /// A daemon at work.
 #[derive(Debug)]
 pub struct Running {
-    /// Where it listens.
-    pub address: SocketAddr,
+    /// Where it listens by TCP, if it does.
+    pub address: Option<SocketAddr>,
     /// What the operating system granted or refused.
     pub notes: Vec<Note>,
     /// The running session, shared with the services.
     pub daemon: Arc<Daemon>,
+    /// Who may do what.
+    pub keeper: Arc<Keeper>,
     ended: JoinHandle<Summary>,
 }
 
@@ -91,7 +98,11 @@ pub async fn start_with(
     run: Runner,
 ) -> Result<Running, ServeError> {
     let config = config.checked()?;
-    let doors = Doors::open(config.listen, config.tls.as_ref(), config.unix.as_deref()).await?;
+    let keeper = Arc::new(match &config.keys {
+        Some(folder) => Keeper::of(folder.clone())?,
+        None => Keeper::open(),
+    });
+    let doors = Doors::open(config.listen, config.tls.as_ref(), config.unix.as_ref()).await?;
     let system = |source| ServeError::System { what: "thread for arms", source };
     let lane = Lane::start(config.measures.of_stream()).await.map_err(system)?;
     let hub = Hub::new(config.display_rate_hz);
@@ -103,18 +114,24 @@ pub async fn start_with(
         arms: lane.handle.clone(),
     };
     let mut bar = Progress::new(&scene.name);
-    let prepared = prepare(scene, &settings, &numbers, &hub, &mut |part| bar.show(part, BUILDING));
+    let prepared =
+        prepare((scene, config.source.clone()), &settings, &numbers, &hub, &mut |part| bar.show(part, BUILDING));
     bar.finish();
-    let Prepared { simulation, session, surface } = prepared?;
+    let Prepared { mut simulation, session, surface } = prepared?;
+    if let Some(kept) = &config.resume {
+        take_up(&mut simulation, kept)?;
+    }
+    let paused = config.resume.as_ref().is_some_and(|kept| kept.paused);
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();
     let (mut notes, the_loop) =
-        start_loop(simulation, desk, sign.clone(), Arc::clone(&timing), config.measures, run).await?;
+        start_loop((simulation, paused), desk, sign.clone(), Arc::clone(&timing), config.measures, run).await?;
     // A refusal is for the same reason as the loop's, which says what to do.
     let of_arms = lane.notes.iter().filter(|note| note.granted);
     notes.extend(of_arms.map(|note| Note { granted: true, text: format!("streams of arms: {}", note.text) }));
     tokio::spawn(clerk.work());
+    let autosave = config.autosave.clone().map(|settings| Arc::new(Autosave::new(settings)));
     let daemon = Arc::new(Daemon {
         orders,
         hub,
@@ -124,6 +141,7 @@ pub async fn start_with(
         stop,
         sign,
         refusals: Arc::default(),
+        autosave: autosave.clone(),
         samples_rejected: AtomicU64::new(0),
         current: RwLock::new(Arc::clone(&session)),
         numbers,
@@ -133,18 +151,34 @@ pub async fn start_with(
     daemon.show(&session, surface);
     let gate = Gate::new(config.bounds, &daemon.refusals);
     let guard = Guard::new(&config.host_names, &daemon.refusals);
-    let (routers, health) = grpc::routes(&daemon, gate, guard).await?;
+    let known = who::gate::Gate::new(&keeper, &daemon.refusals);
+    let (routers, health) = grpc::routes(&daemon, gate, guard, known).await?;
+    if let Some(autosave) = autosave {
+        tokio::spawn(autosave.run(Arc::clone(&daemon)));
+    }
     tokio::spawn(super::watch::watch(Arc::clone(&daemon), health.clone()));
     let address = doors.address;
     let closing = CancellationToken::new();
     let servers = doors.serve(&routers, &lane.handle, config.bounds, &daemon.refusals, &closing);
     let ended = tokio::spawn(until_stopped(Arc::clone(&daemon), the_loop, health, servers, lane, closing, config));
-    Ok(Running { address, notes, daemon, ended })
+    Ok(Running { address, notes, daemon, keeper, ended })
+}
+
+/// Puts a session where it was when it was kept.
+fn take_up(simulation: &mut Simulation, kept: &Kept) -> Result<(), ServeError> {
+    let refuse = |reason: String| ServeError::Resume { reason };
+    let model = Arc::clone(simulation.model());
+    let state = snapshot::restore(&model, &kept.state).map_err(|error| refuse(error.to_string()))?;
+    let hash = snapshot::state_hash(&state);
+    if hash != kept.state_hash {
+        return Err(refuse(format!("the state's hash is {hash:016x}, and {:016x} was kept", kept.state_hash)));
+    }
+    if simulation.restore(&state) { Ok(()) } else { Err(refuse("the state is another body's".to_owned())) }
 }
 
 /// The loop's thread, once it has asked the operating system for its measures.
 async fn start_loop(
-    simulation: Box<Simulation>,
+    (simulation, paused): (Box<Simulation>, bool),
     desk: Desk,
     sign: StopSign,
     timing: Arc<Timing>,
@@ -155,6 +189,9 @@ async fn start_loop(
     let mut tick_loop =
         tick_loop.map_err(|error| ServeError::Prepare(error.into()))?.measured_in(Arc::clone(&timing.the_loop));
     let mut the_loop = Loop::new(simulation, desk, sign.clone(), timing, Clock::Monotonic);
+    if paused {
+        the_loop.pause();
+    }
     let (tell, told) = oneshot::channel();
     let body = move || {
         let _gone_when_dropped = sign.hold();
@@ -195,6 +232,11 @@ async fn until_stopped(
     for service in ["palpate.v1.Device", "palpate.v1.Surface", "palpate.v1.Session", ""] {
         health.set_service_status(service, tonic_health::ServingStatus::NotServing).await;
     }
+    // The loop still takes orders. Forces do not wait for a copy that takes long.
+    let last = match &daemon.autosave {
+        Some(autosave) => timeout(LAST_COPY_WITHIN, autosave.last(&daemon)).await.ok().flatten(),
+        None => None,
+    };
     // Device streams wait for zero force by themselves; the loop ramps now.
     daemon.sign.raise();
     let joined = tokio::task::spawn_blocking(move || thread.join().is_ok());
@@ -202,14 +244,17 @@ async fn until_stopped(
         tracing::error!("the loop ended by a panic");
         failure = Some("the simulation loop ended by a panic");
     }
+    if let (Some(autosave), Some(last)) = (&daemon.autosave, last) {
+        autosave.keep_last(last).await;
+    }
     daemon.session().ended.cancel();
     closing.cancel();
     let all_ended = async { while servers.join_next().await.is_some() {} };
     let cut = timeout(STREAMS_END_WITHIN, all_ended).await.is_err();
     servers.abort_all();
     drop(lane);
-    if let Some(path) = &config.unix {
-        let _ = std::fs::remove_file(path);
+    if let Some(socket) = &config.unix {
+        let _ = std::fs::remove_file(&socket.path);
     }
     Summary {
         timing: Arc::clone(&daemon.timing),

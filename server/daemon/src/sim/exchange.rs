@@ -9,7 +9,7 @@ use std::{
     io,
     sync::{
         Arc,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
 };
 use triple_buffer::{Input, Output, triple_buffer};
@@ -67,6 +67,8 @@ pub struct ToolOutput {
     pub stale: bool,
     /// Time stands, is stepped, or is about to jump: the force ramps to zero.
     pub held: bool,
+    /// The button that the force depends on is not held: the force ramps to zero.
+    pub let_go: bool,
     /// Ticks of this attachment in which the force was limited.
     pub limited: LimitedTicks,
     /// Tick at which the body's state was quarantined.
@@ -90,6 +92,9 @@ pub struct ToolShared {
     attachment: AtomicU64,
     max_force_n_bits: AtomicU64,
     max_torque_nm_bits: AtomicU64,
+    /// 0: the daemon's own.
+    stale_after_s_bits: AtomicU64,
+    is_released: AtomicBool,
 }
 
 impl ToolShared {
@@ -101,6 +106,7 @@ impl ToolShared {
     /// A device attached: the loop turns to it at its next tick, and never asks it for more than `max_force_n` (N).
     pub fn attach(&self, attachment: u64, max_force_n: f64) {
         self.max_force_n_bits.store(max_force_n.to_bits(), Ordering::Relaxed);
+        self.is_released.store(false, Ordering::Relaxed);
         self.attachment.store(attachment, Ordering::Release);
     }
 
@@ -112,6 +118,26 @@ impl ToolShared {
     /// Largest torque the attached device takes (N m); 0: none.
     pub fn max_torque_nm(&self) -> f64 {
         f64::from_bits(self.max_torque_nm_bits.load(Ordering::Relaxed))
+    }
+
+    /// Age (s) beyond which a pose of the device that attaches next is stale.
+    pub fn set_stale_after_s(&self, stale_after_s: f64) {
+        self.stale_after_s_bits.store(stale_after_s.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Age (s) beyond which a pose of the attached device is stale; 0: as the daemon has it.
+    pub fn stale_after_s(&self) -> f64 {
+        f64::from_bits(self.stale_after_s_bits.load(Ordering::Relaxed))
+    }
+
+    /// The attached device is to lose its tool: the loop ramps its force to zero.
+    pub fn release(&self) {
+        self.is_released.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the attached device is to lose its tool.
+    pub fn is_released(&self) -> bool {
+        self.is_released.load(Ordering::Relaxed)
     }
 
     /// The device went.

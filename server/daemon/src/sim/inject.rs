@@ -18,6 +18,8 @@ pub struct Injection {
     pub from_tick: u64,
     /// Ticks it acts, at least 1.
     pub tick_count: u32,
+    /// While an arm is attached, the sum of such forces is bounded.
+    pub is_bounded: bool,
 }
 
 /// Why injections were refused; none of them was taken.
@@ -92,14 +94,19 @@ impl Injections {
         Ok(if fresh.is_empty() { next_tick } else { first_tick })
     }
 
-    /// The forces of a tick. Forgets those that end with it.
-    pub fn acting_in(&mut self, tick: u64) -> &[PointForce] {
+    /// The forces of a tick; those that are bounded are scaled together so that Σ |f| is at most `bound_n` (N). Forgets those that end
+    /// with it.
+    pub fn acting_in(&mut self, tick: u64, bound_n: Option<f64>) -> &[PointForce] {
         self.acting.clear();
         if !self.pending.is_empty() {
+            let bounded = self.pending.iter().filter(|f| f.is_bounded && f.from_tick <= tick);
+            let sum_n: f64 = bounded.map(|f| f.force_n.length()).sum();
+            let share = bound_n.filter(|bound_n| sum_n > *bound_n).map_or(1.0, |bound_n| bound_n / sum_n);
             let acting = &mut self.acting;
             self.pending.retain(|f| {
                 if f.from_tick <= tick {
-                    acting.push(PointForce { node: f.node, force_n: f.force_n });
+                    let force_n = if f.is_bounded { f.force_n * share } else { f.force_n };
+                    acting.push(PointForce { node: f.node, force_n });
                 }
                 tick.saturating_sub(f.from_tick) + 1 < u64::from(f.tick_count) || f.from_tick > tick
             });
@@ -119,14 +126,14 @@ mod tests {
     use super::*;
 
     fn force(from_tick: u64, tick_count: u32) -> Injection {
-        Injection { node: 3, force_n: DVec3::X, from_tick, tick_count }
+        Injection { node: 3, force_n: DVec3::X, from_tick, tick_count, is_bounded: false }
     }
 
     #[test]
     fn forces_act_in_their_ticks_and_in_no_other() {
         let mut injections = Injections::default();
         assert_eq!(injections.add(&[force(7, 2), force(0, 1)], 5), Ok(5));
-        let counts: Vec<usize> = (5..10).map(|tick| injections.acting_in(tick).len()).collect();
+        let counts: Vec<usize> = (5..10).map(|tick| injections.acting_in(tick, None).len()).collect();
         assert_eq!(counts, [1, 0, 1, 1, 0]);
         assert_eq!(injections.pending(), 0);
     }
@@ -143,5 +150,18 @@ mod tests {
         let many = vec![force(0, 1); CAPACITY];
         assert!(injections.add(&many, 1).is_ok());
         assert_eq!(injections.add(&many[..1], 1), Err(InjectRefusal::Full { pending: CAPACITY as u32 }));
+    }
+
+    #[test]
+    fn the_sum_of_bounded_forces_is_bounded_and_others_stay() {
+        let mut injections = Injections::default();
+        let bounded = Injection { is_bounded: true, ..force(0, 9) };
+        injections.add(&[bounded, force(0, 9), bounded, bounded], 1).unwrap();
+        let sum_n = |forces: &[PointForce]| forces.iter().map(|f| f.force_n.length()).sum::<f64>();
+        assert_eq!(sum_n(injections.acting_in(1, None)), 4.0);
+        assert!((sum_n(injections.acting_in(2, Some(1.5))) - 2.5).abs() < 1e-12);
+        assert_eq!(injections.acting()[1].force_n, DVec3::X);
+        assert_eq!(sum_n(injections.acting_in(3, Some(3.0))), 4.0);
+        assert_eq!(sum_n(injections.acting_in(4, Some(0.0))), 1.0);
     }
 }

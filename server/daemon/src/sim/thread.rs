@@ -88,6 +88,11 @@ impl Loop {
         }
     }
 
+    /// Begins with time standing.
+    pub fn pause(&mut self) {
+        self.paused = true;
+    }
+
     /// Runs until the sign is raised and forces are zero.
     pub fn run(&mut self, tick_loop: &mut TickLoop) {
         loop {

@@ -5,7 +5,7 @@
 use super::{
     simulation::Simulation,
     timing::Timing,
-    tool::{Moment, Order},
+    tool::{Moment, Order, ToolLoop},
 };
 use palpate_physics::{StepReport, TickInput, step};
 use palpate_realtime::Clock;
@@ -64,11 +64,13 @@ impl Simulation {
     }
 
     fn advance(&mut self) -> StepReport {
+        let has_arm = self.tools.iter().any(ToolLoop::is_attached);
+        let bound_n = has_arm.then_some(self.max_injected_force_n);
         let input = TickInput {
             tools: &self.targets,
             load_factors: &self.load_factors,
             prescribed_displacements_m: &self.prescribed_m,
-            point_forces: self.injections.acting_in(self.state.mechanical.tick + 1),
+            point_forces: self.injections.acting_in(self.state.mechanical.tick + 1, bound_n),
         };
         step(&self.model, &mut self.state, &mut self.scratch, &input)
     }

@@ -22,6 +22,10 @@ pub struct ArmLimits {
     pub torque: TorqueLimits,
     /// When a sample is stale, and the ramps.
     pub watchdog: WatchdogSettings,
+    /// Largest sum of forces (N) that callers without the role of an operator inject while an arm is attached.
+    pub max_injected_force_n: f64,
+    /// Button that has to be held on an arm for it to have force.
+    pub hold_to_run: Option<u8>,
 }
 
 /// What the loop asks of devices this tick.
@@ -126,7 +130,7 @@ impl ToolLoop {
         self.attachment = attachment;
         self.newest = None;
         self.limited = LimitedTicks::default();
-        self.watchdog = Watchdog::new(self.limits.watchdog);
+        self.watchdog = Watchdog::new(self.patience());
         let own = self.limits.force;
         let max_force_n =
             if attachment == 0 { own.max_force_n } else { own.max_force_n.min(self.port.shared.max_force_n()) };
@@ -139,11 +143,26 @@ impl ToolLoop {
         self.start_over();
     }
 
+    /// How long the attached device may be silent: longer than others, where it said so.
+    fn patience(&self) -> WatchdogSettings {
+        let (own, theirs_s) = (self.limits.watchdog, self.port.shared.stale_after_s());
+        if self.attachment == 0 || theirs_s == 0.0 {
+            return own;
+        }
+        WatchdogSettings { stale_after_s: theirs_s, fresh_for_s: own.fresh_for_s.min(theirs_s), ..own }
+    }
+
     /// A device's tool has to find its place, without force; any other has its own.
     fn start_over(&mut self) {
         let attached = self.is_attached();
         self.level = if attached { 0.0 } else { 1.0 };
         self.place = if attached { Place::Put } else { Place::Clear };
+    }
+
+    /// The button that its force depends on is held, or it depends on none.
+    fn is_held(&self) -> bool {
+        let buttons = self.newest.map_or(0, |sample| sample.buttons);
+        self.limits.hold_to_run.is_none_or(|button| buttons >> button & 1 == 1)
     }
 
     /// Where the tool has to be put before its device moves it, as long as it was not clear of the body since the device
@@ -187,7 +206,7 @@ impl ToolLoop {
             velocity_m_per_s: sample.velocity_m_per_s,
             angular_velocity_rad_per_s: sample.angular_velocity_rad_per_s,
         };
-        let there = extrapolate(&motion, verdict.extrapolate_s, self.limits.watchdog.stale_after_s);
+        let there = extrapolate(&motion, verdict.extrapolate_s, self.watchdog.settings().stale_after_s);
         let target = ToolTarget {
             position_m: there.position_m,
             velocity_m_per_s: there.velocity_m_per_s,
@@ -204,7 +223,7 @@ impl ToolLoop {
         }
         let quarantined = frame.quarantined;
         let ordered = match order {
-            Order::Render => false,
+            Order::Render => self.is_attached() && (self.port.shared.is_released() || !self.is_held()),
             Order::Hold => self.is_attached(),
             Order::Release => true,
         };
@@ -249,6 +268,7 @@ impl ToolLoop {
             proxy_orientation: tool.orientation,
             stale: self.newest.is_some() && watched.is_some_and(|verdict| is_stale(&verdict)),
             held: order == Order::Hold,
+            let_go: self.is_attached() && self.newest.is_some() && !self.is_held(),
             limited: self.limited,
             quarantined,
         };

@@ -20,10 +20,11 @@ use palpate_scene::{
     probes::Measure, shapes::box_mesh,
 };
 use palpated::{
+    doors::{listen::UnixSocket, tls::TlsFiles},
     serve::{Runner, Running, ServeConfig, Summary, start_with},
     sim::thread::Loop,
 };
-use std::time::Duration;
+use std::{fs, path::Path, time::Duration};
 use tokio::{sync::mpsc, time::timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -156,7 +157,8 @@ impl Daemon {
     pub async fn running(scene: Scene, config: ServeConfig, run: Runner) -> Self {
         let stop = CancellationToken::new();
         let running = start_with(config, scene, stop.clone(), run).await.unwrap();
-        let channel = Channel::from_shared(format!("http://{}", running.address)).unwrap().connect().await.unwrap();
+        let channel =
+            Channel::from_shared(format!("http://{}", running.address.unwrap())).unwrap().connect().await.unwrap();
         Self { running: Some(running), stop, channel }
     }
 
@@ -212,6 +214,20 @@ impl Daemon {
     }
 }
 
+/// A certificate of localhost that it has signed itself, in files of this folder.
+pub fn certificate(folder: &Path) -> TlsFiles {
+    let made = rcgen::generate_simple_self_signed(vec!["localhost".to_owned()]).unwrap();
+    let files = TlsFiles { certificate: folder.join("cert.pem"), key: folder.join("key.pem"), authority: None };
+    fs::write(&files.certificate, made.cert.pem()).unwrap();
+    fs::write(&files.key, made.signing_key.serialize_pem()).unwrap();
+    files
+}
+
+/// A Unix socket for this process's user.
+pub fn socket(path: &Path) -> UnixSocket {
+    UnixSocket { path: path.to_owned(), mode: 0o600, group: None }
+}
+
 /// A hello that asks for the first tool.
 pub fn hello() -> v1::DeviceHello {
     v1::DeviceHello {
@@ -220,6 +236,7 @@ pub fn hello() -> v1::DeviceHello {
         max_force_n: 3.0,
         servo_rate_hz: 1e3,
         max_torque_nm: 0.1,
+        ..Default::default()
     }
 }
 

@@ -1,8 +1,11 @@
 //! The stream to the daemon: newest samples up, newest commands down, and back again when it breaks.
+mod source;
+pub use source::SampleSource;
+
 use crate::{
     BridgeError,
     backoff::Backoff,
-    convert::{self, Command, Sample, Welcome},
+    convert::{self, Command, Welcome},
     run::Shared,
     settings::UplinkSettings,
 };
@@ -10,74 +13,17 @@ use palpate_proto::{
     connect::{connect_arm, is_nobody_there, is_transport, why_no_answer, why_unreachable, words_of},
     v1::{self, device_client::DeviceClient, device_down::Message},
 };
-use palpate_realtime::{Clock, Doorbell, Histogram, SlotReader, SlotWriter};
+use palpate_realtime::{Clock, Histogram, SlotWriter};
+use source::UpStream;
 use std::{
-    future::Future,
-    pin::Pin,
-    sync::{Arc, Mutex, PoisonError, atomic::Ordering},
-    task::{Context, Poll, ready},
+    sync::{Arc, Mutex, atomic::Ordering},
     time::{Duration, Instant},
 };
-use tokio::net::unix::pipe;
-use tokio_stream::Stream;
-use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
+use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming, transport::Channel};
 
 /// Longest wait for the daemon's welcome, and for its end of a stream that we ended.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
-
-/// Where samples come from: shared by the streams of successive connections, one at a time.
-#[derive(Debug)]
-pub struct SampleSource {
-    /// The bell's descriptor, read as a pipe is.
-    bell: pipe::Receiver,
-    samples: SlotReader<Option<Sample>>,
-}
-
-impl SampleSource {
-    /// Samples announced by `bell`.
-    ///
-    /// # Errors
-    /// When the runtime cannot watch the bell.
-    pub fn new(bell: &Doorbell, samples: SlotReader<Option<Sample>>) -> std::io::Result<Self> {
-        Ok(Self { bell: pipe::Receiver::from_owned_fd_unchecked(bell.try_clone_fd()?)?, samples })
-    }
-
-    fn poll_newest(&mut self, cx: &mut Context<'_>) -> Poll<Sample> {
-        loop {
-            // An error cannot happen on an open eventfd; were it to, the samples still come with the next ring.
-            let _ = ready!(self.bell.poll_read_ready(cx));
-            let rang = self.bell.try_read(&mut [0; 8]).is_ok();
-            if let (true, Some(Some(sample))) = (rang, self.samples.take()) {
-                return Poll::Ready(*sample);
-            }
-        }
-    }
-}
-
-/// Messages of one connection: the hello, then the newest sample whenever the transport can take one, until ended.
-struct UpStream {
-    hello: Option<v1::DeviceUp>,
-    source: Arc<Mutex<SampleSource>>,
-    end: Pin<Box<WaitForCancellationFutureOwned>>,
-    shared: Arc<Shared>,
-}
-
-impl Stream for UpStream {
-    type Item = v1::DeviceUp;
-
-    fn poll_next(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<v1::DeviceUp>> {
-        if let Some(hello) = self.hello.take() {
-            return Poll::Ready(Some(hello));
-        }
-        if self.end.as_mut().poll(cx).is_ready() {
-            return Poll::Ready(None);
-        }
-        let sample = ready!(self.source.lock().unwrap_or_else(PoisonError::into_inner).poll_newest(cx));
-        self.shared.stats.sent.increment();
-        Poll::Ready(Some(convert::sample(&sample)))
-    }
-}
 
 /// Why a connection ended.
 enum Ended {
@@ -89,6 +35,8 @@ enum Ended {
     Refused(Status),
     /// It was attached, and is no longer.
     Lost(String),
+    /// It was attached, and is not to come back by itself.
+    Dismissed(String),
     /// We ended it.
     ByUs,
 }
@@ -151,6 +99,10 @@ impl Uplink {
         let never_attached = self.shared.stats.attached.get() == 0;
         let text = match ended {
             Ended::ByUs => return Ok(()),
+            Ended::Dismissed(message) => {
+                let (address, message) = (address.clone(), message.clone());
+                return Err(BridgeError::Dismissed { address, message });
+            }
             Ended::Refused(status) => {
                 if let (true, Some(help)) = (never_attached, final_refusal(status.code())) {
                     return Err(refused(address, status, help));
@@ -206,7 +158,7 @@ impl Uplink {
             end: Box::pin(stream_end.cancelled_owned()),
             shared: Arc::clone(&self.shared),
         };
-        let mut client = DeviceClient::new(channel);
+        let mut client = DeviceClient::with_interceptor(channel, self.settings.bearer.clone());
         let attach = async {
             let mut down = client.attach(up).await?.into_inner();
             let first = down.message().await?;
@@ -270,6 +222,9 @@ impl Uplink {
             };
             match message {
                 Ok(Some(message)) => self.take(message, welcome, &mut told),
+                Ok(None) | Err(_) if told.dismissed.is_some() => {
+                    return Ended::Dismissed(told.dismissed.unwrap_or_default());
+                }
                 Ok(None) => return Ended::Lost("it ended the stream".to_owned()),
                 Err(status) => return Ended::Lost(words_of(&status)),
             }
@@ -340,11 +295,14 @@ impl Uplink {
     }
 
     fn take_fault(&self, fault: &v1::DeviceFault, told: &mut Told) {
-        use v1::DeviceFaultCode::{Detached, Quarantined};
+        use v1::DeviceFaultCode::{Detached, Dismissed, Quarantined};
         self.shared.stats.peer_faults.increment();
         let text = format!("the daemon reports: {}", fault.message);
-        let stops = matches!(fault.code(), Detached | Quarantined);
-        if stops {
+        let stops = matches!(fault.code(), Detached | Dismissed | Quarantined);
+        if fault.code() == Dismissed {
+            // It is what the bridge ends with, and says then.
+            told.dismissed = Some(fault.message.clone());
+        } else if stops {
             // It tells each of these once itself.
             tracing::warn!("{text}");
         } else {
@@ -369,6 +327,8 @@ struct Told {
     is_judged: bool,
     newest_sequence: u64,
     said: Vec<String>,
+    /// Why the arm is not to come back by itself.
+    dismissed: Option<String>,
 }
 
 impl Told {
