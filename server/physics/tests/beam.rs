@@ -1,6 +1,6 @@
 //! A cantilever, 100 × 10 × 10 mm, E = 100 kPa: Timoshenko's deflection at a small load; and the elastica on a slender one.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod common;
+use crate::common;
 use common::{
     block, equilibrium, extrapolated, held, material, mean_displacement_m, nodes_where, spec, triangles_where,
 };

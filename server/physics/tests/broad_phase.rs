@@ -1,6 +1,6 @@
 //! Skipping what a tool cannot touch changes no bit.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{ModelSpec, State, contact::Coupling, material::Law, snapshot};
 use rig::{Drive, Rig, at, body, bricks, even, material, sphere};

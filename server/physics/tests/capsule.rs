@@ -1,6 +1,6 @@
 //! Capsules: what they press with, how they turn, and what neither may break.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::{DQuat, DVec3};
 use palpate_physics::{
     Energies, Integrator, ModelSpec,

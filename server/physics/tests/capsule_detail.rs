@@ -1,7 +1,7 @@
 //! Capsules on bodies that are fine near tools only: hybrid bodies, whose particles wake there, and surfaces of
 //! springs, which are refined there.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::{DQuat, DVec3};
 use palpate_physics::{
     BodySpec, Energies, LoadSpec, ModelSpec, PrescribedSpec, Settings, Substeps,

@@ -1,7 +1,7 @@
 //! A rigid tool slips from its device before it goes through a surface. A device that went on drove it through: a force
 //! of some newtons, then none, the tool buried or beneath the floor.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec,

@@ -1,6 +1,6 @@
 //! Contact against known answers: Hertz's force on a layer, its convergence, and the balance of forces.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{ModelSpec, Region, contact::Coupling, material::Law};
 use rig::{Rig, body, bricks, even, graded, hold, material, nodes_where, solid_mut, sphere};

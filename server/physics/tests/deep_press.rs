@@ -1,6 +1,6 @@
 //! A press as deep as the tool is wide: the substeps grow as the skin below it is stretched.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{Energies, Settings, bodies::hybrid::Waking, contact::Coupling, material::Viscosity, world};
 use rig::{Rig, bricks, even, held_below, hybrid_block, solid_mut, sphere};

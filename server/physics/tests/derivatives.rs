@@ -1,6 +1,6 @@
 //! One harness for every law: energy → stress → stiffness by central differences; viscous stress; known values.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod support;
+use crate::support;
 use glam::{DMat3, DVec3};
 use palpate_physics::{
     elements::linear_tet::RestTet,

@@ -1,6 +1,6 @@
 //! Energy and momentum: conserved in free flight, accounted for under every kind of work, bounded under impulses.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, LoadSpec, Model, ModelSpec, PointForce, State, Substeps, TetMesh,

@@ -1,6 +1,6 @@
 //! The static solve: known equilibria, agreement with the dynamics, and errors that say what is wrong.
 #![allow(clippy::unwrap_used)]
-mod common;
+use crate::common;
 use common::{block, equilibrium, held, material, mean_displacement_m, nodes_where, spec, triangles_where};
 use glam::DVec3;
 use palpate_physics::{

@@ -1,6 +1,6 @@
 //! Contact where it is hard: through the body, thin walls, huge tools, inverted elements, stick and slip.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, Substeps,

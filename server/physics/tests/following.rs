@@ -2,7 +2,7 @@
 //!
 //! [`ContactModel::following`]: palpate_physics::contact::ContactModel::following
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec,

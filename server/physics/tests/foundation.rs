@@ -1,6 +1,6 @@
 //! The foundation's stiffness: what it adds to the highest frequency, and that its bound holds.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{Energies, ModelSpec, contact::Coupling, material::Law};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, sphere};

@@ -2,7 +2,7 @@
 //! millinewtons for a radius of 1 mm: limited so in the air, too, a tool of 20 g was 33 mm behind a hand that moved at
 //! 1 m/s, and met the body a tenth of a second late.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 
 use glam::DVec3;
 use palpate_physics::{

@@ -1,7 +1,7 @@
 //! Natural frequencies of the cantilever 100 × 10 × 10 mm, E = 100 kPa, 1000 kg/m³: by modes of the stiffness, and by letting it
 //! swing in time.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod common;
+use crate::common;
 use common::{block, extrapolated, held, material, mean_displacement_m, nodes_where, spec};
 use glam::DVec3;
 use palpate_physics::{

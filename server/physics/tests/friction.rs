@@ -1,6 +1,6 @@
 //! Coulomb friction of a tool on a body.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{ModelSpec, contact::Coupling, material::Law};
 use rig::{Rig, body, bricks, even, hold, material, nodes_where, solid_mut, sphere};

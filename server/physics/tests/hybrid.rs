@@ -1,6 +1,6 @@
 //! Bodies with particles, tick by tick.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, ModelSpec, Precision, Settings, Substeps, bodies::hybrid::Waking, contact::Coupling, snapshot,

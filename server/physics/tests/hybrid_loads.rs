@@ -1,7 +1,7 @@
 //! Whatever presses, wakes. Loads and injected forces met coarse tets alone in the loop: 0.02 N on a patch bent it by 12 to
 //! 46 % less than at rest in `static`, and a load per vertex woke less in `static` than one load on the region.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, ModelSpec, PointForce,

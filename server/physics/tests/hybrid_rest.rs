@@ -1,6 +1,6 @@
 //! Equilibria of bodies with particles: `solve_static` and `step` come to the same rest, and known answers.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, LoadSpec, Model, ModelSpec, Settings,

@@ -1,6 +1,6 @@
 //! What the state of a hybrid body goes back to: in ticks that are repeated, in quarantine, and from a snapshot.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     PointForce, Precision, Scratch,

@@ -1,6 +1,6 @@
 //! Particles of hybrid bodies that wake and fall asleep while the body moves and is pressed.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, Precision, Scratch, bodies::hybrid::Waking, contact::Coupling, snapshot, world::wake_only,

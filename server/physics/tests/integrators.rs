@@ -1,6 +1,6 @@
 //! Every integrator: order in time, momentum, drag, equilibrium, and what does not depend on the scheme.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, Integrator, ModelSpec, PointForce, Substeps, contact::Coupling,

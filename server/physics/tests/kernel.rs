@@ -1,6 +1,6 @@
 //! The force kernel against its scalar oracle, and its own promises: same bits on every instruction set, balanced forces.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod support;
+use crate::support;
 use glam::DVec3;
 use palpate_physics::{
     Precision, TetMesh,

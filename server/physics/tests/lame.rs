@@ -1,7 +1,7 @@
 //! Lamé's thick sphere under internal pressure, `a = 50 mm`, `b = 100 mm`, `E = 10 kPa`, `p = 1 kPa · 10⁻³` (small strain):
 //! `u(r) = p a³/(E(b³ − a³)) · [(1 − 2ν) r + (1 + ν) b³/(2r²)]`. One octant with three planes of symmetry.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod common;
+use crate::common;
 use common::{equilibrium, extrapolated, held, material, nodes_where, shell_octant, spec, triangles_where};
 use glam::DVec3;
 use palpate_physics::{LoadSpec, Model, material::Law};

@@ -1,6 +1,6 @@
 //! The local contact model against finite differences of static presses, and its promises.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::{DQuat, DVec3};
 use palpate_physics::{
     ModelSpec,

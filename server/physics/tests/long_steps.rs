@@ -1,6 +1,6 @@
 //! The coarse level of a body with particles in steps of its own.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{Energies, ModelSpec, Precision, Settings, Substeps, bodies::hybrid::Waking, contact::Coupling};
 use rig::{Rig, held_below, hybrid_block, sphere, wake_nearest};

@@ -1,6 +1,6 @@
 //! The patch test, in both precisions, and rigid motion.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod common;
+use crate::common;
 use common::{Random, block, equilibrium, jittered, material, spec};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_physics::{Model, ModelSpec, Precision, PrescribedSpec, TetMesh, material::Law};

@@ -1,6 +1,6 @@
 //! Tools that are put somewhere, move with the body, or are too small for its surface.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Model, ModelSpec, State,

@@ -1,6 +1,6 @@
 //! The proxy stays on its side of the body, whatever the device does.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec,

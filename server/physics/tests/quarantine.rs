@@ -1,6 +1,6 @@
 //! What is not finite is refused, contained and reported; the last good state stays.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, Model, ModelSpec, PointForce, State, StepReport,

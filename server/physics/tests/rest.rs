@@ -1,6 +1,6 @@
 //! `solve_static` and `step` come to the same rest, with tools that are rigid, on a spring, and on a saturated spring.
 #![allow(clippy::unwrap_used)]
-mod common;
+use crate::common;
 use common::{block, held, material, spec};
 use glam::DVec3;
 use palpate_physics::{

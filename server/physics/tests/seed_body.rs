@@ -1,8 +1,8 @@
 //! The papers' hybrid as a body of the loop: its steps are the papers' own, tools press it, and it is contained, saved and refused as
 //! others are.
 #![allow(clippy::unwrap_used)]
-mod octahedra;
-mod rig;
+use crate::octahedra;
+use crate::rig;
 use glam::DVec3;
 use octahedra::{FACE_M, OUTWARDS, body_spec, device_m, layer, parameters};
 use palpate_physics::{

@@ -3,8 +3,8 @@
 //! A ventricle's near wall, pressed by a tool, used to pass through its far wall: contact knew tools and no walls. So
 //! did the arms of a clamp, and two parts of one body.
 #![allow(clippy::unwrap_used)]
-mod rig;
-mod walls;
+use crate::rig;
+use crate::walls;
 use glam::DVec3;
 use palpate_physics::{
     Energies, SelfContactChoice, Substeps,

@@ -1,6 +1,6 @@
 //! Skipping viscous terms of materials without viscosity changes no bit. (Contact's broad phase: `broad_phase.rs`.)
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec, Region, State,

@@ -1,6 +1,6 @@
 //! A body at rest is left alone: never further from the truth than the tolerance, and awake when anything changes.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, Integrator, LoadSpec, Model, ModelError, ModelSpec, PointForce, PrescribedSpec, bodies::hybrid::Waking,

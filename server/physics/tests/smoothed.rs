@@ -1,8 +1,8 @@
 //! Smoothed tets: what they keep of linear ones (balance, rigid motion, forces that are derivatives of an energy), and what they
 //! are better at: bending, and volume that hardly changes.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod common;
-mod rig;
+use crate::common;
+use crate::rig;
 use common::{
     Random, block, equilibrium, held, jittered, material, mean_displacement_m, nodes_where, spec, triangles_where,
 };

@@ -1,6 +1,6 @@
 //! Snapshots: bit-exact continuation, typed refusals, and no panic whatever the bytes.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     ModelSpec,

@@ -1,6 +1,6 @@
 //! What the static solve costs: the table of docs/adr/static-solve.md. Timing is printed, never asserted.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod common;
+use crate::common;
 use common::{block, held, material, spec, triangles_where};
 use glam::DVec3;
 use palpate_physics::{

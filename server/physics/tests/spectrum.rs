@@ -1,6 +1,6 @@
 //! ω_max: against a dense eigen-solve, a formula, the element bound, and what the leapfrog does on either side of 2/ω_max.
 #![allow(clippy::unwrap_used)] // helpers outside #[test] functions
-mod support;
+use crate::support;
 use faer::{Mat, Side};
 use glam::DVec3;
 use palpate_physics::{

@@ -1,7 +1,7 @@
 //! Mass-spring surfaces beneath tools: refinement, forces, energy, equilibrium.
 #![allow(clippy::unwrap_used)]
-mod rig;
-mod sheet;
+use crate::rig;
+use crate::sheet;
 use glam::DVec3;
 use palpate_physics::{
     LoadSpec, ModelSpec, Substeps,

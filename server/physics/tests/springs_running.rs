@@ -1,7 +1,7 @@
 //! Mass-spring surfaces, tick by tick: the same bits, vertices that sleep, snapshots, no allocation.
 #![allow(clippy::unwrap_used)]
-mod rig;
-mod sheet;
+use crate::rig;
+use crate::sheet;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DQuat, DVec3};
 use palpate_physics::{

@@ -1,7 +1,7 @@
 //! The look for strained elements by what a run has ready, against the one that makes everything anew: `palpated simulate`
 //! looks every ten ticks, and took 1.17 times as long for it on a hybrid body.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     bodies::hybrid::Waking,

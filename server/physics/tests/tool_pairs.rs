@@ -3,7 +3,7 @@
 //! Two coupled spheres on either side of a slab of 10 mm, their devices driven 11 mm in from both sides, overlapped by
 //! 1.2 mm: the slab between them gave way, and neither tool knew the other.
 #![allow(clippy::unwrap_used)]
-mod rig;
+use crate::rig;
 use glam::DVec3;
 use palpate_physics::{
     Energies, ModelSpec,

@@ -1,7 +1,7 @@
 //! A step that is too long is noticed, taken back and repeated in more parts; one that is not is left alone.
 #![allow(clippy::unwrap_used)]
-mod rig;
-mod support;
+use crate::rig;
+use crate::support;
 use glam::DVec3;
 use palpate_physics::bodies::hybrid::Waking;
 use palpate_physics::{

@@ -1,7 +1,7 @@
 //! The substeps of viscous bodies: enough to be stable, and hardly more.
 #![allow(clippy::unwrap_used)]
-mod rig;
-mod support;
+use crate::rig;
+use crate::support;
 use palpate_physics::{
     BodySpec, Energies, ModelSpec, Precision, Settings, Substeps,
     bodies::{hybrid::Waking, tet::TetElements},

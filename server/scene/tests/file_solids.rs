@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
 
-mod cubes;
+use crate::cubes;
 
 fn volume(name: &str, data: impl AsRef<[u8]>) -> VolumeFile {
     parse_volume(Path::new(name), data.as_ref()).unwrap_or_else(|error| panic!("{name}: {error}"))
