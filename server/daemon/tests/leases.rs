@@ -9,7 +9,7 @@ use tonic::Code;
 /// Its samples' rate decides how long a device may be silent; one that goes quiet loses its tool, and the next gets it.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_silent_device_loses_its_tool() {
-    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut quiet = daemon.attach(hello()).await;
     assert_eq!(quiet.welcome().await.limits.unwrap().lease_s, 0.2);
     let goodbye = goodbye(&mut quiet).await;
@@ -36,7 +36,7 @@ async fn a_silent_device_loses_its_tool() {
 /// A script of 100 Hz heard STALE between its samples.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_slow_device_that_says_so_is_not_stale_between_its_samples() {
-    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut slow = daemon.attach(v1::DeviceHello { sample_rate_hz: 10.0, ..hello() }).await;
     let limits = slow.welcome().await.limits.unwrap();
     assert_eq!((limits.stale_after_s, limits.lease_s), (0.2, 0.5));
@@ -74,7 +74,7 @@ async fn a_slow_device_that_says_so_is_not_stale_between_its_samples() {
 /// An order takes a tool from a device that presses: the force goes down, not away, and the tool is free when it is answered.
 #[tokio::test(flavor = "multi_thread")]
 async fn an_order_takes_the_tool_from_a_device() {
-    let daemon = Daemon::on(block_scene("block", 2)).await;
+    let daemon = Daemon::on(block_scene("block", 3)).await;
     let mut session = daemon.session();
     let nobody = session.detach(v1::DetachRequest::default()).await.unwrap_err();
     assert_eq!(nobody.code(), Code::FailedPrecondition, "{nobody:?}");

@@ -69,8 +69,8 @@ pub enum Refused {
     /// The name has been revoked.
     #[error("what was issued to this name has been revoked")]
     Revoked,
-    /// The certificate is over.
-    #[error("the certificate has ended")]
+    /// The certificate or the token is over.
+    #[error("the certificate or token has ended")]
     Ended,
     /// The certificate names nobody.
     #[error("the certificate has no name or no role")]
