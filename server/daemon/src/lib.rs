@@ -5,6 +5,7 @@ pub mod doors;
 pub mod grpc;
 pub mod kept;
 pub mod load;
+pub mod metrics;
 pub mod offline;
 pub mod page;
 mod progress;

@@ -89,6 +89,11 @@ impl Guarded {
 
 const HOUR: Duration = Duration::from_hours(1);
 
+/// Calls of gRPC, and who may make them.
+fn all_calls() -> impl Iterator<Item = (&'static str, Who)> {
+    TABLE.into_iter().filter(|(path, _)| *path != palpated::metrics::PATH)
+}
+
 /// What a call is answered, with an empty message; a stream that begins is left again.
 async fn answer(connection: &Connection, path: &'static str) -> Result<(), Status> {
     let mut grpc = Grpc::new(connection.clone());
@@ -115,7 +120,7 @@ async fn every_forbidden_pair_of_role_and_call_is_denied() {
         let roles = Roles::of(&[role]);
         let by_token = daemon.with_token(daemon.token(name, roles, HOUR)).await;
         for connection in [daemon.with_certificate(name, roles).await, by_token] {
-            for (path, who) in TABLE {
+            for (path, who) in all_calls() {
                 let answer = answer(&connection, path).await;
                 let expected = (!who.includes(roles)).then_some(Code::PermissionDenied);
                 assert_eq!(is_refused(&answer), expected, "{name} at {path}: {answer:?}");
@@ -124,7 +129,7 @@ async fn every_forbidden_pair_of_role_and_call_is_denied() {
     }
     // Nobody, and somebody of another authority, are not let in at all.
     let nobody = daemon.connect(Credentials::default()).await;
-    for (path, who) in TABLE {
+    for (path, who) in all_calls() {
         let expected = (who != Who::Anybody).then_some(Code::Unauthenticated);
         assert_eq!(is_refused(&answer(&nobody, path).await), expected, "nobody at {path}");
     }
@@ -174,10 +179,9 @@ async fn of_many_hostile_calls_none_succeeds() {
             _ => Some(good.clone()),
         };
         let is_good = token.as_ref() == Some(&good);
-        let calls: Vec<&'static str> = TABLE
-            .iter()
+        let calls: Vec<&'static str> = all_calls()
             .filter(|(_, who)| *who != Who::Anybody && !(is_good && who.includes(viewer)))
-            .map(|(path, _)| *path)
+            .map(|(path, _)| path)
             .collect();
         let path = calls[dice.below(calls.len())];
         let scheme = if dice.below(10) > 0 { "Bearer " } else { "Basic " };
@@ -324,6 +328,52 @@ async fn what_others_inject_is_bounded_while_an_arm_is_attached() {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     daemon.finish().await;
+}
+
+async fn get_metrics(channel: tonic::transport::Channel, token: Option<String>) -> (u16, String) {
+    use http_body_util::BodyExt as _;
+    use tower::ServiceExt as _;
+    let mut ask = http::Request::get("/metrics");
+    if let Some(token) = token {
+        ask = ask.header("authorization", format!("Bearer {token}"));
+    }
+    let response = channel.oneshot(ask.body(tonic::body::Body::empty()).unwrap()).await.unwrap();
+    assert!(response.status() != 200 || response.headers()["x-accel-buffering"] == "no");
+    let status = response.status().as_u16();
+    let bytes = response.into_body().collect().await.unwrap().to_bytes();
+    (status, String::from_utf8(bytes.to_vec()).unwrap())
+}
+
+/// Metrics are for whoever may watch, in a form that their readers take.
+#[tokio::test(flavor = "multi_thread")]
+async fn metrics_tell_what_there_is_to_who_may_watch() {
+    let open = common::Daemon::on(block_scene("measured", 3)).await;
+    let mut arm = open.attach(hello()).await;
+    arm.welcome().await;
+    arm.hold_until(above(), |command| command.sample_sequence > 20).await;
+    let (status, text) = get_metrics(open.channel.clone(), None).await;
+    assert_eq!(status, 200);
+    let value = |name: &str| -> f64 {
+        let line = text.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}:\n{text}"));
+        line.rsplit(' ').next().unwrap().parse().unwrap()
+    };
+    assert!(value("palpate_ticks_total ") > 20.0 && value("palpate_quarantined ") == 0.0);
+    assert!(value("palpate_device_samples_total{device=\"test arm\",tool=\"finger\"} ") > 20.0);
+    assert!(value("palpate_tick_cost_seconds{quantile=\"0.99\"} ") > 0.0);
+    assert!(value("palpate_stage_cost_seconds{stage=\"coupling\",quantile=\"0.5\"} ") > 0.0);
+    assert!(value("palpate_resident_memory_bytes ") > 1e6);
+    assert!(text.ends_with("# EOF\n"), "{text}");
+    drop(arm);
+    open.finish().await;
+
+    let guarded = Guarded::new(|_| ()).await;
+    let credentials = Credentials { authority: Some(guarded.keys.authority()), ..Credentials::default() };
+    let channel = endpoint(&guarded.url(), &credentials).unwrap().connect().await.unwrap();
+    let of = |role| Some(guarded.token("somebody", Roles::of(&[role]), HOUR));
+    for (token, expected) in [(None, 401), (of(Role::Device), 403), (of(Role::Viewer), 200)] {
+        assert_eq!(get_metrics(channel.clone(), token).await.0, expected);
+    }
+    guarded.finish().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,4 +1,5 @@
 //! What the crate's users see, tested: in one program, which is linked once and runs as many tests at a time as there are processors.
+#![allow(clippy::unwrap_used, clippy::expect_used)] // helpers outside #[test] functions
 mod cubes;
 
 mod bad_input;

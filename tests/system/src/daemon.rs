@@ -33,8 +33,8 @@ impl Daemon {
     /// On this address.
     pub fn at(address: &str, program: &str, arguments: &[&str]) -> Self {
         let mut program = Program::start(program, &[arguments, &["--listen", address]].concat());
-        let line = program.wait_for("http://127.0.0.1:", PATIENCE);
-        let from = line.find("http://").unwrap();
+        let line = program.wait_for("://127.0.0.1:", PATIENCE);
+        let from = line.find("http").unwrap();
         let url = line[from..].split_whitespace().next().unwrap().trim_end_matches(['/', ',', ')']).to_owned();
         Self { program, url }
     }

@@ -99,7 +99,10 @@ fn is_of(origin: &HeaderValue, host: &Authority) -> bool {
 /// Lets a request pass, or answers what is wrong with it.
 pub async fn check(State(guard): State<Guard>, request: Request, next: Next) -> Response {
     let Some((code, text)) = guard.fault(request.uri(), request.headers()) else {
-        return next.run(request).await;
+        let mut response = next.run(request).await;
+        // A proxy that gathers answers would keep streams from who watches: nginx asks this header.
+        response.headers_mut().insert("x-accel-buffering", HeaderValue::from_static("no"));
+        return response;
     };
     guard.refusals.count(Reason::Foreign, request.extensions().get::<Peer>().copied());
     let mut response = Response::new(Body::from(text + "\n"));

@@ -15,7 +15,7 @@ use crate::{
         origin::{self, Guard},
         whole::{self, Gate},
     },
-    page,
+    metrics, page,
     session::{ActiveSession, Daemon},
     who,
 };
@@ -64,6 +64,8 @@ pub async fn routes(
             .register_encoded_file_descriptor_set(DESCRIPTOR_SET)
             .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
     };
+    let daemon = Arc::clone(daemon);
+    let of_daemon = move || async move { metrics::serve(&daemon) };
     let arms = Routes::new(device.clone())
         .into_axum_router()
         .layer(axum::middleware::from_fn_with_state(known.clone(), who::gate::pass));
@@ -74,6 +76,7 @@ pub async fn routes(
         .add_service(reflection().build_v1()?.max_decoding_message_size(MAX_SMALL_BYTES))
         .add_service(reflection().build_v1alpha()?.max_decoding_message_size(MAX_SMALL_BYTES))
         .into_axum_router()
+        .route(metrics::PATH, axum::routing::get(of_daemon))
         .fallback(page_or_unimplemented)
         .layer(axum::middleware::from_fn_with_state(gate, whole::take))
         // Nothing of a request is read before it is known who sends it.

@@ -2,6 +2,7 @@
 pub mod args;
 pub mod config;
 pub mod error;
+mod manager;
 pub mod report;
 mod run;
 mod start;

@@ -1,5 +1,5 @@
 //! The process: load, start, tell, wait for a signal, say goodbye.
-use super::{Runner, ServeConfig, ServeError, args::ServeArgs, report, start_with};
+use super::{Runner, ServeConfig, ServeError, args::ServeArgs, manager::notify, report, start_with};
 use crate::{
     doors::descriptors,
     kept::folder::Slot,
@@ -90,13 +90,6 @@ fn reload(keeper: &Keeper) {
     match keeper.reload() {
         Ok(()) => tracing::info!("keys and revoked names are read again"),
         Err(error) => tracing::error!(error = causes(&error), "keys cannot be read again: those of before stay"),
-    }
-}
-
-/// Tells systemd, if it is there.
-fn notify(states: &[NotifyState<'_>]) {
-    if let Err(error) = sd_notify::notify(states) {
-        tracing::debug!(%error, "no service manager was told");
     }
 }
 

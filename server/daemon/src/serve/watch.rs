@@ -1,6 +1,8 @@
 //! Looks at the loop from outside: what an operator has to know goes to the log, and to health.
+use super::manager::notify;
 use crate::session::Daemon;
 use palpate_proto::v1::device_server::DeviceServer;
+use sd_notify::NotifyState;
 use std::{sync::Arc, time::Duration};
 use tokio::time::{Instant, MissedTickBehavior, interval};
 use tonic::server::NamedService as _;
@@ -18,11 +20,19 @@ pub(super) async fn watch(daemon: Arc<Daemon>, health: HealthReporter) {
     let mut every = interval(PERIOD);
     every.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut quarantined = None;
+    // A service manager starts the daemon anew when the loop has not woken for so long.
+    let watchdog = sd_notify::watchdog_enabled();
+    let (mut ticks, mut last_told) = (0, Instant::now());
     let (mut late, mut late_said) = (0, Instant::now());
     loop {
         tokio::select! {
             () = daemon.stop.cancelled() => return,
             _ = every.tick() => {}
+        }
+        let ticks_now = daemon.timing.the_loop.ticks();
+        if ticks_now != ticks && watchdog.is_some_and(|every| last_told.elapsed() * 3 >= every) {
+            (ticks, last_told) = (ticks_now, Instant::now());
+            notify(&[NotifyState::Watchdog]);
         }
         let now = daemon.timing.quarantined_at();
         if now != quarantined {

@@ -3,16 +3,19 @@ use super::{
     keeper::{Caller, Keeper, Refused},
     table,
 };
-use crate::doors::{
-    refusals::{Peer, Reason, Refusals},
-    tls::PeerCertificate,
-    whole,
+use crate::{
+    doors::{
+        refusals::{Peer, Reason, Refusals},
+        tls::PeerCertificate,
+        whole,
+    },
+    metrics,
 };
 use axum::{
     body::{Body, Bytes, HttpBody},
     extract::{Request, State},
     http::{
-        HeaderMap, HeaderValue,
+        HeaderMap, HeaderValue, StatusCode,
         header::{AUTHORIZATION, CONTENT_TYPE},
     },
     middleware::Next,
@@ -27,7 +30,7 @@ use std::{
 };
 use tokio::time::{Interval, MissedTickBehavior, interval};
 use tokio_util::sync::CancellationToken;
-use tonic::Status;
+use tonic::{Code, Status};
 
 /// How often it is looked whether a stream's caller may go on.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -54,7 +57,8 @@ pub struct Expiry(pub CancellationToken);
 
 /// Lets a call pass, with its caller as an extension, or answers why not. What is no call of a service is the page's.
 pub async fn pass(State(gate): State<Gate>, mut request: Request, next: Next) -> Response {
-    if !whole::is_grpc(request.headers()) {
+    let is_call = whole::is_grpc(request.headers());
+    if !is_call && request.uri().path() != metrics::PATH {
         return next.run(request).await;
     }
     let peer = request.extensions().get::<Peer>().copied();
@@ -62,7 +66,7 @@ pub async fn pass(State(gate): State<Gate>, mut request: Request, next: Next) ->
         Ok(caller) => caller,
         Err(status) => {
             gate.refusals.count(Reason::Forbidden, peer);
-            return whole::refused(&status, request.headers());
+            return if is_call { whole::refused(&status, request.headers()) } else { in_words(&status) };
         }
     };
     let Caller::Known(_) = &caller else {
@@ -79,6 +83,16 @@ pub async fn pass(State(gate): State<Gate>, mut request: Request, next: Next) ->
     response.map(|body| {
         Body::new(Watched { body, keeper: gate.keeper, caller, looks, expiry, goodbye: None, is_web, is_over: false })
     })
+}
+
+/// A refusal for who does not speak gRPC.
+fn in_words(status: &Status) -> Response {
+    let mut response = Response::new(Body::from(format!("{}\n", status.message())));
+    *response.status_mut() = match status.code() {
+        Code::PermissionDenied => StatusCode::FORBIDDEN,
+        _ => StatusCode::UNAUTHORIZED,
+    };
+    response
 }
 
 fn is_web(headers: &HeaderMap) -> bool {

@@ -1,5 +1,6 @@
 //! Calls by role. What is not in the table is denied; a test holds it against the descriptor, so that none is forgotten.
 use super::role::{Role, Roles};
+use crate::metrics;
 
 /// Who may make a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +18,7 @@ const INJECTORS: Who = Who::With(Roles::of(&[Role::Injector, Role::Operator]));
 const DEVICES: Who = Who::With(Roles::of(&[Role::Device]));
 
 /// Every call, and who may make it.
-pub const TABLE: [(&str, Who); 17] = [
+pub const TABLE: [(&str, Who); 18] = [
     ("/palpate.v1.Device/Attach", DEVICES),
     ("/palpate.v1.Surface/Watch", WATCHERS),
     ("/palpate.v1.Session/List", EVERY_ROLE),
@@ -30,6 +31,7 @@ pub const TABLE: [(&str, Who); 17] = [
     ("/palpate.v1.Session/Snapshot", OPERATORS),
     ("/palpate.v1.Session/Restore", OPERATORS),
     ("/palpate.v1.Session/InjectForces", INJECTORS),
+    (metrics::PATH, WATCHERS),
     ("/grpc.health.v1.Health/Check", Who::Anybody),
     ("/grpc.health.v1.Health/List", Who::Anybody),
     ("/grpc.health.v1.Health/Watch", EVERY_ROLE),
@@ -81,7 +83,7 @@ mod tests {
             tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
             tonic_reflection::pb::v1alpha::FILE_DESCRIPTOR_SET,
         ];
-        let all: BTreeSet<String> = sets.into_iter().flat_map(methods).collect();
+        let all: BTreeSet<String> = sets.into_iter().flat_map(methods).chain([metrics::PATH.to_owned()]).collect();
         assert_eq!(known, all);
     }
 
