@@ -73,26 +73,27 @@ pub struct Uplink {
     pub lease: Duration,
 }
 
-/// In so many looks without a sample a lease ends. A daemon that stands still itself for a while looks once meanwhile, and takes no
-/// tool from a device whose samples were there, unread.
+/// In so many looks without a sample a lease ends.
 const LOOKS: u32 = 10;
 
-/// How long a device has been silent.
-#[derive(Debug)]
+/// How long a device has been silent. Time in which the daemon stood still does not count: it looks once meanwhile, and where its loop
+/// did not tick, a device that sends a sample for each command had none to send.
+#[derive(Debug, Default)]
 struct Silence {
     accepted: u64,
+    ticks: u64,
     looks: u32,
 }
 
 impl Silence {
-    fn new() -> Self {
-        Self { accepted: 0, looks: 0 }
-    }
-
-    /// Whether it has been silent for the time of its lease, `accepted` being the number of its samples so far.
-    fn look(&mut self, accepted: u64) -> bool {
-        self.looks = if accepted == self.accepted { self.looks + 1 } else { 0 };
-        self.accepted = accepted;
+    /// Whether it has been silent for the time of its lease, after so many samples of its and ticks of the loop.
+    fn look(&mut self, accepted: u64, ticks: u64) -> bool {
+        if accepted != self.accepted {
+            self.looks = 0;
+        } else if ticks != self.ticks {
+            self.looks += 1;
+        }
+        (self.accepted, self.ticks) = (accepted, ticks);
         self.looks >= LOOKS
     }
 }
@@ -106,7 +107,7 @@ impl Uplink {
         let mut last_sequence = None;
         let mut counts: BTreeMap<i32, u64> = BTreeMap::new();
         let over = self.over.clone();
-        let mut silence = Silence::new();
+        let mut silence = Silence::default();
         let mut looks = interval_at(Instant::now() + self.lease / LOOKS, self.lease / LOOKS);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
@@ -114,7 +115,8 @@ impl Uplink {
                 () = over.cancelled() => return Ok(()),
                 message = self.messages.message() => message,
                 _ = looks.tick() => {
-                    if silence.look(self.record.accepted.load(Ordering::Relaxed)) {
+                    let ticks = self.daemon.timing.the_loop.ticks();
+                    if silence.look(self.record.accepted.load(Ordering::Relaxed), ticks) {
                         self.record.dismiss(Dismissal::Silent);
                     }
                     continue;
@@ -166,12 +168,18 @@ mod tests {
 
     #[test]
     fn only_silence_of_the_whole_lease_ends_it() {
-        let mut silence = Silence::new();
-        let mut looks = |accepted: u64, times: u32| (0..times).any(|_| silence.look(accepted));
+        let (mut silence, mut ticks) = (Silence::default(), 0);
+        let mut looks = |accepted: u64, times: u32, goes_on: bool| {
+            (0..times).any(|_| {
+                ticks += u64::from(goes_on);
+                silence.look(accepted, ticks)
+            })
+        };
         // A device that has said hello and nothing else has as long as any other.
-        assert!(!looks(0, LOOKS - 1));
-        assert!(!looks(1, LOOKS));
-        assert!(!looks(2, LOOKS));
-        assert!(looks(2, 1));
+        assert!(!looks(0, LOOKS - 1, true));
+        assert!(!looks(1, LOOKS, true));
+        assert!(!looks(2, LOOKS, true));
+        assert!(!looks(2, 100, false), "the loop stands");
+        assert!(looks(2, 1, true));
     }
 }
