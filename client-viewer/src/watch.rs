@@ -5,7 +5,7 @@ use crate::{
     surface::{Surface, Watcher, magnitude},
 };
 use clap::Args;
-use palpate_proto::v1::LevelOfDetail;
+use palpate_proto::{connect::causes, v1::LevelOfDetail};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Arguments of `watch`.
@@ -51,18 +51,63 @@ struct Second {
     quarantine: String,
 }
 
-/// Runs `watch`.
+/// Pauses before a lost stream is asked for again.
+const PAUSES: [Duration; 5] = [
+    Duration::from_millis(250),
+    Duration::from_millis(500),
+    Duration::from_secs(1),
+    Duration::from_secs(2),
+    Duration::from_secs(4),
+];
+
+/// Runs `watch`: a stream that is lost is asked for again, as long as it is wanted.
 ///
 /// # Errors
-/// An unreachable daemon or a broken stream.
+/// A daemon that was never reached, or that refuses.
 pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), ViewError> {
+    let ends = arguments.seconds.map(|seconds| Instant::now() + seconds);
+    let mut attempts = 0;
+    let mut has_watched = false;
+    loop {
+        let Err(error) = watch_once(server, arguments, ends, &mut attempts, &mut has_watched).await else {
+            return Ok(());
+        };
+        if !(has_watched && may_come_back(&error)) {
+            return Err(error);
+        }
+        let pause = PAUSES[PAUSES.len().min(attempts + 1) - 1];
+        if ends.is_some_and(|ends| Instant::now() + pause >= ends) {
+            return Err(error);
+        }
+        eprintln!("{}; trying again in {} s", causes(&error), pause.as_secs_f64());
+        attempts += 1;
+        tokio::time::sleep(pause).await;
+    }
+}
+
+/// Whether a daemon that is started anew may answer otherwise.
+fn may_come_back(error: &ViewError) -> bool {
+    match error {
+        ViewError::Unreachable { .. } | ViewError::Lost(_) | ViewError::Stream(_) => true,
+        ViewError::Refused { code, .. } => code == "Unavailable",
+        _ => false,
+    }
+}
+
+/// Watches one stream to its end, or to that of the time; with its first update `attempts` begin anew.
+async fn watch_once(
+    server: &Server,
+    arguments: &WatchArguments,
+    ends: Option<Instant>,
+    attempts: &mut usize,
+    has_watched: &mut bool,
+) -> Result<(), ViewError> {
     let detail = if arguments.numbers_only { LevelOfDetail::Numbers } else { LevelOfDetail::Full };
     let mut watcher = Watcher::start(server.connect().await?, arguments.rate_hz, detail).await?;
-    let begin = Instant::now();
-    let mut second = Window::new(begin);
+    let mut second = Window::new(Instant::now());
     let mut named = None;
     loop {
-        let left = arguments.seconds.map(|seconds| seconds.saturating_sub(begin.elapsed()));
+        let left = ends.map(|ends| ends.saturating_duration_since(Instant::now()));
         if left.is_some_and(|left| left.is_zero()) {
             break;
         }
@@ -71,6 +116,7 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
         let Some(surface) = next? else {
             return Err(ViewError::Stream("was ended by the daemon".into()));
         };
+        (*attempts, *has_watched) = (0, true);
         if named != Some(surface.epoch) {
             named = Some(surface.epoch);
             // Numbers of two scenes make no mean.

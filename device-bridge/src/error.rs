@@ -1,4 +1,5 @@
 //! What stops a bridge, and what to do about it.
+use crate::recording::recorder::RecordFailure;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use std::{path::PathBuf, process::ExitCode};
 use thiserror::Error;
@@ -78,6 +79,13 @@ pub enum BridgeError {
         message: String,
         /// What to do.
         help: &'static str,
+    },
+    /// The recording ended before the arm did.
+    #[error("the recording {path} ended after {written} rows: {reason}", path = failure.path.display(), written = failure.written, reason = failure.reason)]
+    #[diagnostic(help("what is there is whole; make room on the disk, or record elsewhere with --record"))]
+    Recording {
+        /// What went wrong.
+        failure: RecordFailure,
     },
     /// Somebody took the tool from this arm.
     #[error("the daemon at {address} reports: {message}")]

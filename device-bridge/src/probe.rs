@@ -3,6 +3,7 @@ use crate::{
     BridgeError, Config,
     config::RecordConfig,
     device::{self, Effort, Reading},
+    recording::recorder::Failure,
     settings::Settings,
 };
 use glam::DVec3;
@@ -37,7 +38,7 @@ pub fn probe(config: &Config, time: Duration) -> Result<Report, BridgeError> {
     // A look at the arm is no recording.
     let settings = Settings::new(&Config { record: RecordConfig::default(), ..config.clone() })?;
     let period_s = settings.servo.period_s;
-    let mut arm = device::open(&settings.device, period_s, &CancellationToken::new(), |_| Ok(()))?;
+    let mut arm = device::open(&settings.device, period_s, &CancellationToken::new(), &Failure::default(), |_| Ok(()))?;
     let mut tick_loop = TickLoop::new(Clock::Monotonic, period_s)
         .map_err(|error| BridgeError::Value { key: "servo.rate_hz".to_owned(), reason: error.to_string() })?;
     let monitor = tick_loop.monitor();

@@ -2,6 +2,7 @@
 use crate::{
     BridgeError, Config, Stats, Summary, device,
     guard::Guard,
+    recording::recorder::Failure,
     servo::{Servo, ServoLaw},
     settings::{ServoSettings, Settings},
     stats::reason,
@@ -117,7 +118,8 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let settings = Settings::new(config)?;
     let shared = handle.shared;
     let (server, told) = vrpn_server::open(settings.vrpn_server.as_ref(), &shared)?.unzip();
-    let device = open(&settings, &shutdown).await?;
+    let recording = Failure::default();
+    let device = open(&settings, &shutdown, &recording).await?;
     let Some(device) = device else { return Ok(shared.stats.summary()) };
     let settings = settings.bearable(device.stiffest_wall_n_per_m());
     let _ = shared.stiffness.set(settings.servo.stiffness);
@@ -179,6 +181,9 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         let _ = time::timeout(END_TIMEOUT, server).await;
     }
     stopped?;
+    if let (Ok(Ok(())), Some(failure)) = (&ended, recording.get()) {
+        return Err(BridgeError::Recording { failure: failure.clone() });
+    }
     match ended {
         Ok(result) => result.map(|()| shared.stats.summary()),
         Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
@@ -234,10 +239,16 @@ fn start_guard(device: &dyn device::Arm, settings: &Settings, program: Option<&P
 }
 
 /// The arm, opened on a thread that may wait; `None` when the bridge was told to stop meanwhile.
-async fn open(settings: &Settings, shutdown: &CancellationToken) -> Result<Option<Box<dyn device::Arm>>, BridgeError> {
-    let (settings, stop) = (settings.clone(), shutdown.clone());
+async fn open(
+    settings: &Settings,
+    shutdown: &CancellationToken,
+    recording: &Failure,
+) -> Result<Option<Box<dyn device::Arm>>, BridgeError> {
+    let (settings, stop, failure) = (settings.clone(), shutdown.clone(), recording.clone());
     let opening = tokio::task::spawn_blocking(move || {
-        device::open(&settings.device, settings.servo.period_s, &stop, |stiffest| settings.demand_bearable(stiffest))
+        device::open(&settings.device, settings.servo.period_s, &stop, &failure, |stiffest| {
+            settings.demand_bearable(stiffest)
+        })
     });
     tokio::select! {
         () = shutdown.cancelled() => Ok(None),

@@ -5,6 +5,7 @@ mod libhd;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use glam::{DMat3, DVec3};
+use palpate_bridge::recording::recorder::Failure;
 use palpate_bridge::{
     Config,
     config::{
@@ -63,7 +64,8 @@ fn the_servo_allocates_nothing() {
     let guard = Guard::start(program, words, Duration::from_mins(1), &OsMeasures::NONE).unwrap();
     let mut servo = Servo {
         law: ServoLaw::new(settings.servo),
-        device: device::open(&settings.device, 1e-3, &CancellationToken::new(), |_| Ok(())).unwrap(),
+        device: device::open(&settings.device, 1e-3, &CancellationToken::new(), &Failure::default(), |_| Ok(()))
+            .unwrap(),
         last: None,
         down,
         up,
@@ -116,7 +118,8 @@ fn drive(device: DeviceConfig) {
 fn drive_by(config: &Config, periods: u64) {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let settings = runtime.block_on(async { Settings::new(config).unwrap() });
-    let mut arm = device::open(&settings.device, 1e-3, &CancellationToken::new(), |_| Ok(())).unwrap();
+    let mut arm =
+        device::open(&settings.device, 1e-3, &CancellationToken::new(), &Failure::default(), |_| Ok(())).unwrap();
     for tick in 0..300 {
         std::thread::sleep(Duration::from_millis(1));
         std::thread::sleep(Duration::from_millis(1));

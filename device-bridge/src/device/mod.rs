@@ -24,7 +24,10 @@ pub mod workspace;
 
 use crate::{
     BridgeError,
-    recording::{read::RecordingError, recorder::Recorded},
+    recording::{
+        read::RecordingError,
+        recorder::{Failure, Recorded},
+    },
     settings::{ArmSettings, DeviceSettings},
 };
 use falcon::Falcon;
@@ -197,12 +200,13 @@ pub fn open(
     settings: &DeviceSettings,
     period_s: f64,
     stop: &CancellationToken,
+    failure: &Failure,
     demand: impl FnOnce(Option<f64>) -> Result<(), BridgeError>,
 ) -> Result<Box<dyn Arm>, BridgeError> {
     let mut arm = open_arm(&settings.arm, period_s, stop)?;
     demand(arm.stiffest_wall_n_per_m().map(|of_arm| settings.workspace.stiffness_of_world(of_arm)))?;
     if let Some(record) = &settings.record {
-        arm = Box::new(Recorded::start(arm, record, period_s)?);
+        arm = Box::new(Recorded::start(arm, record, period_s, failure)?);
     }
     Ok(Box::new(Placed::new(arm, settings.workspace, settings.clutch, period_s)))
 }

@@ -10,10 +10,10 @@ use palpate_control::Motion;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::{
     fs::File,
-    io::{self, BufWriter, Write},
+    io::{self, Seek as _, Write as _},
     path::{Path, PathBuf},
     sync::{
-        Arc,
+        Arc, OnceLock,
         atomic::{AtomicU64, Ordering},
     },
     thread::JoinHandle,
@@ -63,6 +63,28 @@ fn refused(path: &Path, error: &io::Error) -> BridgeError {
     BridgeError::Value { key: "record.path".to_owned(), reason: format!("cannot write {}: {error}", path.display()) }
 }
 
+/// Why a recording ended before its arm did, once it has.
+#[derive(Debug, Clone, Default)]
+pub struct Failure(Arc<OnceLock<RecordFailure>>);
+
+/// A recording that ended before its arm did.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordFailure {
+    /// The file.
+    pub path: PathBuf,
+    /// Whole rows that are in it, at least.
+    pub written: u64,
+    /// Why.
+    pub reason: String,
+}
+
+impl Failure {
+    /// What went wrong, if anything did.
+    pub fn get(&self) -> Option<&RecordFailure> {
+        self.0.get()
+    }
+}
+
 /// An arm, and what it did.
 #[derive(Debug)]
 pub struct Recorded {
@@ -80,10 +102,15 @@ impl Recorded {
     ///
     /// # Errors
     /// [`BridgeError::Value`] when the file cannot be written, [`BridgeError::System`] without a thread.
-    pub fn start(arm: Box<dyn Arm>, settings: &RecordSettings, period_s: f64) -> Result<Self, BridgeError> {
+    pub fn start(
+        arm: Box<dyn Arm>,
+        settings: &RecordSettings,
+        period_s: f64,
+        failure: &Failure,
+    ) -> Result<Self, BridgeError> {
         let file = settings.create()?;
         let (queue, rows) = Queue::new(QUEUE);
-        let writer = Writer::start(file, &settings.path, rows, Arc::clone(&queue.made))
+        let writer = Writer::start(file, &settings.path, rows, Arc::clone(&queue.made), failure.clone())
             .map_err(|source| BridgeError::System { what: "start the recording's thread", source })?;
         Ok(Self { arm, queue, _writer: writer, period_s, periods: 0, read: None })
     }
@@ -100,7 +127,8 @@ impl Arm for Recorded {
     /// A lost arm does nothing more that is known.
     fn apply(&mut self, effort: &Effort) {
         self.arm.apply(effort);
-        if let Some(reading) = self.read.take() {
+        // After the recording's end rows are for nobody.
+        if let Some(reading) = self.read.take().filter(|_| self.queue.is_written()) {
             self.queue.push(&Row::new(self.periods as f64 * self.period_s, &reading, *effort));
         }
     }
@@ -137,6 +165,11 @@ impl Queue {
         (Self { rows, made: Arc::default() }, waiting)
     }
 
+    /// Whether somebody writes what is put in.
+    fn is_written(&self) -> bool {
+        !self.rows.is_abandoned()
+    }
+
     fn push(&mut self, row: &Row) {
         // Lost when it is full.
         let _ = self.rows.push(*row);
@@ -154,11 +187,22 @@ struct Writer {
 }
 
 impl Writer {
-    fn start(file: File, path: &Path, rows: Consumer<Row>, made: Arc<AtomicU64>) -> io::Result<Self> {
+    fn start(file: File, path: &Path, rows: Consumer<Row>, made: Arc<AtomicU64>, failure: Failure) -> io::Result<Self> {
         let written = Arc::<AtomicU64>::default();
         let thread = std::thread::Builder::new().name("palpate-record".to_owned()).spawn({
-            let written = Arc::clone(&written);
-            move || write_all(BufWriter::new(file), rows, &written)
+            let (written, path) = (Arc::clone(&written), path.to_owned());
+            move || {
+                let ended = write_all(file, rows, &written);
+                if let Err(error) = &ended {
+                    let (written, reason) = (written.load(Ordering::Relaxed), error.to_string());
+                    tracing::error!(
+                        "the recording {} ends here, after {written} rows: {reason}; the arm goes on without it",
+                        path.display()
+                    );
+                    let _ = failure.0.set(RecordFailure { path, written, reason });
+                }
+                ended
+            }
         })?;
         Ok(Self { path: path.to_owned(), made, written, thread: Some(thread) })
     }
@@ -179,32 +223,51 @@ impl Drop for Writer {
             (written, lost, Ok(())) => {
                 tracing::warn!("recorded {written} rows in {path}; {lost} rows are lost: the disk did not keep up");
             }
-            (written, lost, Err(error)) => {
-                tracing::error!("the recording {path} failed after some {written} rows, {lost} are lost: {error}");
-            }
+            // It was said when it happened.
+            (_, _, Err(_)) => {}
         }
     }
 }
 
-/// Until the other end is gone and the queue empty.
-fn write_all(mut out: impl Write, mut rows: Consumer<Row>, written: &AtomicU64) -> io::Result<()> {
+/// Until the other end is gone and the queue empty. What the disk has no room for does not stand there in part: the file ends with a whole
+/// row. `written` counts rows that the disk has taken.
+fn write_all(mut file: File, mut rows: Consumer<Row>, written: &AtomicU64) -> io::Result<()> {
     let mut flushed = Instant::now();
+    let (mut waiting, mut count) = (Vec::with_capacity(BLOCK_BYTES), 0);
     loop {
         // Asked first: what was put in before it went is still taken.
         let is_last = rows.is_abandoned();
         while let Ok(row) = rows.pop() {
-            write_row(&mut out, &row)?;
-            written.fetch_add(1, Ordering::Relaxed);
+            write_row(&mut waiting, &row)?;
+            count += 1;
+            if waiting.len() >= BLOCK_BYTES {
+                break;
+            }
+        }
+        if waiting.len() >= BLOCK_BYTES || flushed.elapsed() > FLUSH_EVERY || (is_last && !waiting.is_empty()) {
+            append(&mut file, &waiting)?;
+            written.fetch_add(count, Ordering::Relaxed);
+            waiting.clear();
+            (count, flushed) = (0, Instant::now());
+            continue;
         }
         if is_last {
-            return out.flush();
-        }
-        if flushed.elapsed() > FLUSH_EVERY {
-            out.flush()?;
-            flushed = Instant::now();
+            return Ok(());
         }
         std::thread::sleep(LOOK_EVERY);
     }
+}
+
+/// Rows are handed to the disk in blocks of about this size.
+const BLOCK_BYTES: usize = 64 * 1024;
+
+/// Appends a block of whole rows, or nothing of it.
+fn append(file: &mut File, block: &[u8]) -> io::Result<()> {
+    let before = file.stream_position().unwrap_or(0);
+    file.write_all(block).inspect_err(|_| {
+        // What cannot be cut, a device, has no length.
+        let _ = file.set_len(before);
+    })
 }
 
 #[cfg(test)]
@@ -225,7 +288,7 @@ mod tests {
     fn every_tick_is_a_row_with_its_force_and_skipped_ticks_are_time() {
         let folder = tempfile::tempdir().unwrap();
         let settings = RecordSettings { path: folder.path().join("a.csv"), overwrite: false };
-        let mut arm = Recorded::start(simulated(), &settings, 1e-3).unwrap();
+        let mut arm = Recorded::start(simulated(), &settings, 1e-3, &Failure::default()).unwrap();
         for periods in [1, 1, 3] {
             arm.read(periods).unwrap();
             arm.apply(&Effort::force(DVec3::Z * periods as f64));
@@ -240,12 +303,12 @@ mod tests {
         assert_eq!(read::file(&settings.path).unwrap().len(), 3);
         let again = settings.clone().checked().unwrap_err().to_string();
         assert!(again.starts_with("record.path: cannot write ") && again.ends_with("or say --overwrite"), "{again}");
-        assert_eq!(Recorded::start(simulated(), &settings, 1e-3).unwrap_err().to_string(), again);
+        assert_eq!(Recorded::start(simulated(), &settings, 1e-3, &Failure::default()).unwrap_err().to_string(), again);
         let over = RecordSettings { overwrite: true, ..settings };
-        drop(Recorded::start(simulated(), &over, 1e-3).unwrap());
+        drop(Recorded::start(simulated(), &over, 1e-3, &Failure::default()).unwrap());
         assert_eq!(std::fs::read_to_string(&over.path).unwrap().lines().count(), 1);
         let nowhere = RecordSettings { path: "/nowhere/a.csv".into(), overwrite: false };
-        let error = Recorded::start(simulated(), &nowhere, 1e-3).unwrap_err().to_string();
+        let error = Recorded::start(simulated(), &nowhere, 1e-3, &Failure::default()).unwrap_err().to_string();
         assert!(error.starts_with("record.path: cannot write /nowhere/a.csv: No such file"), "{error}");
     }
 
@@ -260,7 +323,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.csv");
         let file = File::create(&path).unwrap();
-        let mut writer = Writer::start(file, &path, rows, Arc::clone(&queue.made)).unwrap();
+        let mut writer = Writer::start(file, &path, rows, Arc::clone(&queue.made), Failure::default()).unwrap();
         drop(queue);
         let (written, lost, result) = writer.end();
         assert_eq!((written, lost, result.is_ok()), (4, 6, true));
@@ -276,12 +339,34 @@ mod tests {
         assert!(refused.starts_with("record.path: cannot write /dev/full: No space"), "{refused}");
         let (mut queue, rows) = Queue::new(10_000);
         let file = File::options().write(true).open("/dev/full").unwrap();
-        let mut writer = Writer::start(file, &settings.path, rows, Arc::clone(&queue.made)).unwrap();
+        let failure = Failure::default();
+        let mut writer = Writer::start(file, &settings.path, rows, Arc::clone(&queue.made), failure.clone()).unwrap();
         for tick in 0..20_000 {
             queue.push(&Row::new(f64::from(tick), &Witness::at_rest(), Effort::NONE));
         }
+        // It ends at once, not when the arm does.
+        let until = Instant::now() + Duration::from_secs(20);
+        while queue.is_written() {
+            assert!(Instant::now() < until);
+            std::thread::sleep(LOOK_EVERY);
+        }
         drop(queue);
         let (written, lost, result) = writer.end();
-        assert!(written + lost == 20_000 && lost > 0 && result.is_err(), "{written}, {lost}, {result:?}");
+        assert!((written, lost) == (0, 20_000) && result.is_err(), "{written}, {lost}, {result:?}");
+        let failure = failure.get().unwrap();
+        assert!(failure.written == 0 && failure.reason.contains("No space"), "{failure:?}");
+    }
+
+    #[test]
+    fn a_block_that_finds_no_room_leaves_whole_rows() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let mut file = File::create(&path).unwrap();
+        append(&mut file, b"1,2\n").unwrap();
+        drop(file);
+        // A file that is only read refuses as a full disk does.
+        let mut read_only = File::open(&path).unwrap();
+        assert!(append(&mut read_only, b"3,4\n").is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"1,2\n");
     }
 }
