@@ -1,6 +1,8 @@
 //! `status`: what the daemon runs, how well it keeps time, and who is attached.
 use crate::{ViewError, cli, connect::Server};
-use palpate_proto::v1::{AwakeFor, Percentiles, StatusRequest, StatusResponse, session_client::SessionClient};
+use palpate_proto::v1::{
+    AwakeFor, Percentiles, SafetyState, StatusRequest, StatusResponse, session_client::SessionClient,
+};
 use serde_json::json;
 use std::{collections::BTreeMap, fmt::Write as _};
 
@@ -84,9 +86,10 @@ fn facts(status: &StatusResponse) -> Vec<Vec<String>> {
         line(
             "device",
             format!(
-                "{} drives {}: {:.3} N, {} samples ({} rejected), newest {:.1} ms old",
+                "{} drives {}: {}{:.3} N, {} samples ({} rejected), newest {:.1} ms old",
                 device.device_name,
                 device.tool_name,
+                safety_words(device.safety_state()),
                 device.force_n,
                 device.samples_accepted,
                 device.samples_rejected,
@@ -197,6 +200,7 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "devices": status.devices.iter().map(|d| json!({
             "device_name": d.device_name, "tool_name": d.tool_name, "samples_accepted": d.samples_accepted,
             "samples_rejected": d.samples_rejected, "newest_sample_age_s": d.newest_sample_age_s, "force_n": d.force_n,
+            "safety_state": d.safety_state().as_str_name(),
         })).collect::<Vec<_>>(),
         "probes": status.probes.iter().map(|p| json!({"name": p.name, "unit": p.unit, "components": p.components, "values": p.values})).collect::<Vec<_>>(),
         "viewers": status.viewers,
@@ -206,6 +210,16 @@ fn to_json(status: &StatusResponse) -> serde_json::Value {
         "quarantine": status.quarantine,
         "state_warnings": status.state_warnings,
     })
+}
+
+/// What an arm says of its force, before its numbers; nothing of one that operates, or says nothing.
+fn safety_words(state: SafetyState) -> &'static str {
+    match state {
+        SafetyState::Unspecified | SafetyState::Operating => "",
+        SafetyState::Standby => "no force yet, ",
+        SafetyState::ProtectiveStop => "PROTECTIVE STOP, ",
+        SafetyState::FaultLatched => "FAULT LATCHED, no force until somebody at the arm recovers it, ",
+    }
 }
 
 #[cfg(test)]

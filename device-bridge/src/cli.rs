@@ -86,6 +86,9 @@ pub struct Cli {
     /// Record over a file that is there
     #[arg(long)]
     overwrite: bool,
+    /// File that remembers a latched fault: after the next start it is latched as well, until SIGUSR1 recovers it
+    #[arg(long, value_name = "FILE")]
+    latch_file: Option<PathBuf>,
     /// Let the force come back by itself after a latched fault
     #[arg(long)]
     auto_recover: bool,
@@ -235,6 +238,7 @@ impl Cli {
         replace(&mut config.servo.report_every_s, self.report_every_s);
         replace(&mut config.limits.max_force_n, self.max_force_n);
         config.servo.auto_recover |= self.auto_recover;
+        config.servo.latch_file = self.latch_file.clone().or(config.servo.latch_file.take());
         config.record.path = self.record.clone().or(config.record.path.take());
         config.record.overwrite |= self.overwrite;
         choose(&mut config, self.device);

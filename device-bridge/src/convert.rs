@@ -1,8 +1,8 @@
 //! The one border between wire types and ours. Nothing that is not finite, complete and of the right shape passes.
 use crate::{device::Reading, settings::UplinkSettings};
 use glam::{DMat3, DQuat, DVec3};
-use palpate_control::{ForceLimits, LocalModel, LocalTorque, TorqueLimits};
-use palpate_proto::v1;
+use palpate_control::{Fault, ForceLimits, Link, LocalModel, LocalTorque, TorqueLimits};
+use palpate_proto::{PROTOCOL_VERSION, v1};
 use thiserror::Error;
 
 /// Why a message was refused.
@@ -17,6 +17,14 @@ pub enum Rejection {
     /// A number has no sense, such as a negative limit or a matrix of eight values.
     #[error("{0} is out of range")]
     OutOfRange(&'static str),
+    /// The daemon speaks a later version of the protocol.
+    #[error(
+        "the daemon speaks version {version} of the protocol and this bridge version {PROTOCOL_VERSION}: update palpate-bridge"
+    )]
+    Newer {
+        /// The daemon's.
+        version: u32,
+    },
 }
 
 /// What the daemon granted.
@@ -67,6 +75,8 @@ pub struct Sample {
     pub device_time_ns: u64,
     /// What was read.
     pub reading: Reading,
+    /// What becomes of the force.
+    pub link: Link,
 }
 
 /// The first message up.
@@ -81,8 +91,19 @@ pub fn hello(settings: &UplinkSettings) -> v1::DeviceUp {
         // A sample for every round of the servo; how old one may be is the daemon's to say.
         sample_rate_hz: servo_rate_hz,
         pose_valid_for_s: 0.0,
+        protocol_version: PROTOCOL_VERSION,
     };
     v1::DeviceUp { message: Some(v1::device_up::Message::Hello(hello)) }
+}
+
+fn safety_state(link: Link) -> v1::SafetyState {
+    match link {
+        Link::Waiting => v1::SafetyState::Standby,
+        Link::Fresh | Link::Extrapolating => v1::SafetyState::Operating,
+        // One that was asked for is no fault.
+        Link::Ramping(_) | Link::Latched(Fault::Requested) => v1::SafetyState::ProtectiveStop,
+        Link::Latched(_) => v1::SafetyState::FaultLatched,
+    }
 }
 
 /// Every later message up.
@@ -100,6 +121,7 @@ pub fn sample(sample: &Sample) -> v1::DeviceUp {
     let message = v1::DeviceSample {
         sequence: sample.sequence,
         device_time_ns: sample.device_time_ns,
+        safety_state: safety_state(sample.link).into(),
         pose: Some(pose),
         twist: Some(twist),
         buttons: sample.reading.buttons,
@@ -114,6 +136,9 @@ pub fn sample(sample: &Sample) -> v1::DeviceUp {
 /// [`Rejection`] when a limit is missing or has no sense.
 pub fn welcome(wire: &v1::DeviceWelcome) -> Result<Welcome, Rejection> {
     let limits = wire.limits.as_ref().ok_or(Rejection::Missing("welcome.limits"))?;
+    if wire.protocol_version > PROTOCOL_VERSION {
+        return Err(Rejection::Newer { version: wire.protocol_version });
+    }
     Ok(Welcome {
         session_id: wire.session_id.clone(),
         tool_name: wire.tool_name.clone(),

@@ -15,6 +15,7 @@ pub mod device;
 pub mod emulate;
 pub mod error;
 pub mod guard;
+pub mod latch;
 pub mod measure;
 pub mod probe;
 pub mod recording;

@@ -2,6 +2,7 @@
 use crate::{
     BridgeError, Config, Stats, Summary, device,
     guard::Guard,
+    latch::Latch,
     recording::recorder::Failure,
     servo::{Servo, ServoLaw},
     settings::{ServoSettings, Settings},
@@ -128,8 +129,13 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let bell = Doorbell::new().map_err(|source| BridgeError::System { what: "create an eventfd", source })?;
     let heard = bell.clone();
     let guard = start_guard(&*device, &settings, shared.guard_program.get());
+    let mut latch = latch(&settings)?;
+    let mut law = ServoLaw::new(settings.servo);
+    if let Some(fault) = latch.as_ref().and_then(Latch::remembered).filter(|_| !settings.servo.auto_recover) {
+        law.begin_latched(fault);
+    }
     let servo = Servo {
-        law: ServoLaw::new(settings.servo),
+        law,
         device,
         last: None,
         down,
@@ -162,7 +168,10 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
             () = shutdown.cancelled() => break Outcome::Asked,
             ended = &mut uplink => break Outcome::UplinkEnded(ended),
             _ = &mut servo_done => break Outcome::ServoDied,
-            _ = every.tick() => watcher.look(&shared),
+            _ = every.tick() => {
+                watcher.look(&shared);
+                remember(latch.as_mut(), &shared);
+            }
         }
     };
     // The force first; then the stream that carries it.
@@ -172,6 +181,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         }
         _ => stop_servo(&shared, &settings.servo, servo_done).await,
     };
+    remember(latch.as_mut(), &shared);
     end.cancel();
     let ended = match outcome {
         Outcome::UplinkEnded(ended) => ended,
@@ -187,6 +197,26 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     match ended {
         Ok(result) => result.map(|()| shared.stats.summary()),
         Err(panic) => Err(BridgeError::System { what: "run the uplink", source: std::io::Error::other(panic) }),
+    }
+}
+
+/// Where a latched fault is remembered, if it is to be.
+fn latch(settings: &Settings) -> Result<Option<Latch>, BridgeError> {
+    let at = |path: &PathBuf| {
+        Latch::at(path.clone()).map_err(|source| BridgeError::Read {
+            what: "the file that remembers a latched fault,",
+            path: path.clone(),
+            source,
+        })
+    };
+    settings.latch_file.as_ref().map(at).transpose()
+}
+
+/// Writes down what is latched now. Before the first tick nothing is known of the link.
+fn remember(latch: Option<&mut Latch>, shared: &Shared) {
+    let Some(latch) = latch.filter(|_| shared.stats.summary().ticks > 0) else { return };
+    if let Err(error) = latch.follow(shared.stats.link()) {
+        tracing::error!("a latched fault is not remembered: {error}");
     }
 }
 
@@ -382,7 +412,7 @@ impl Watcher {
                 tracing::warn!("{}: the force is zero until the daemon answers steadily", reason(fault));
             }
             Link::Latched(fault) => tracing::warn!(
-                "{}: the force stays at zero. Recover with `kill -USR1 {}`, or start with --auto-recover",
+                "{}: the force stays at zero: recover with `kill -USR1 {}`, or start with --auto-recover",
                 reason(fault),
                 std::process::id()
             ),

@@ -14,6 +14,10 @@ pub mod v1 {
 /// The encoded `FileDescriptorSet` of the package, for server reflection and for the web page.
 pub const DESCRIPTOR_SET: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/palpate_descriptor.bin"));
 
+/// Version of `Device` that this build speaks. It changes when an older peer would misunderstand a newer one, or lack what keeps an arm
+/// safe; fields that may be left out change nothing.
+pub const PROTOCOL_VERSION: u32 = 1;
+
 /// Largest snapshot that is sent and may be restored (bytes): some 600 000 nodes. Clients have to raise tonic's limit of 4 MiB to it.
 pub const MAX_SNAPSHOT_BYTES: usize = 64 * 1024 * 1024;
 

@@ -105,6 +105,9 @@ pub struct ServoConfig {
     pub rate_hz: f64,
     /// Let the force come back by itself after a latched fault, once the daemon has answered for half a second.
     pub auto_recover: bool,
+    /// File that remembers a latched fault, so that it is latched after the next start as well; absent: a start forgets it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub latch_file: Option<PathBuf>,
     /// Share of ticks, over the last thousand, in which the newest answer must have been in time; with fewer the force is taken away. 0: any.
     pub least_success_rate: f64,
     /// A second process takes the force away when this one is killed or hangs; for arms whose connection outlives it.
@@ -115,7 +118,14 @@ pub struct ServoConfig {
 
 impl Default for ServoConfig {
     fn default() -> Self {
-        Self { rate_hz: 1000.0, auto_recover: false, least_success_rate: 0.9, guard: true, report_every_s: 10.0 }
+        Self {
+            rate_hz: 1000.0,
+            auto_recover: false,
+            latch_file: None,
+            least_success_rate: 0.9,
+            guard: true,
+            report_every_s: 10.0,
+        }
     }
 }
 

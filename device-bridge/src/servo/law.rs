@@ -85,6 +85,11 @@ impl ServoLaw {
         self.watchdog.trip(now_ns, fault);
     }
 
+    /// Begins with a fault that was latched before this program was started.
+    pub fn begin_latched(&mut self, fault: Fault) {
+        self.watchdog.begin_latched(fault);
+    }
+
     /// Latches at once: the force was taken away already.
     pub fn latch(&mut self, fault: Fault) {
         self.watchdog.latch(fault);

@@ -125,7 +125,12 @@ impl Servo {
     fn tell(&mut self, now_ns: u64, reading: &Reading, tick: &ServoTick) {
         if self.shared.attached.load(Ordering::Relaxed) {
             self.sequence += 1;
-            self.up.publish(Some(Sample { sequence: self.sequence, device_time_ns: now_ns, reading: *reading }));
+            self.up.publish(Some(Sample {
+                sequence: self.sequence,
+                device_time_ns: now_ns,
+                reading: *reading,
+                link: tick.verdict.link,
+            }));
             self.bell.ring();
         }
         if let Some(told) = &mut self.told {

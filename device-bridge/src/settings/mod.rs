@@ -16,7 +16,7 @@ use palpate_control::{ParameterError, StiffnessBound, WatchdogSettings};
 use palpate_proto::connect::{self, Bearer, ConnectError, Credentials};
 use palpate_realtime::OsMeasures;
 pub use servo::ServoSettings;
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 use tonic::transport::Endpoint;
 pub use vrpn_server::VrpnServerSettings;
 
@@ -35,6 +35,8 @@ pub struct Settings {
     pub measures: OsMeasures,
     /// A second process takes the force away when this one is killed.
     pub guard: bool,
+    /// Where a latched fault is remembered.
+    pub latch_file: Option<PathBuf>,
     /// Pause between lines of counters.
     pub report_every: Option<Duration>,
 }
@@ -108,6 +110,7 @@ impl Settings {
             servo,
             measures: measures(config)?,
             guard: config.servo.guard,
+            latch_file: config.servo.latch_file.clone(),
             report_every: (!report_every.is_zero()).then_some(report_every),
         })
     }

@@ -190,6 +190,7 @@ fn welcome(max_force_n: f64) -> DeviceDown {
         max_torque_rate_nm_per_s: 0.0,
     };
     let welcome = v1::DeviceWelcome {
+        protocol_version: palpate_proto::PROTOCOL_VERSION,
         session_id: "mock".into(),
         tool_name: "probe".into(),
         tick_period_s: 1e-3,

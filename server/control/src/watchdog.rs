@@ -165,6 +165,12 @@ impl Watchdog {
         }
     }
 
+    /// Begins with a fault that was latched before: no force until it is recovered from. It is no new one.
+    pub fn begin_latched(&mut self, fault: Fault) {
+        self.latched = Some(fault);
+        self.level = 0.0;
+    }
+
     /// Leaves a latched fault: the next sample ramps the force up. False when nothing is latched.
     pub fn recover(&mut self) -> bool {
         let was_latched = self.latched.take().is_some();
@@ -344,6 +350,21 @@ mod tests {
         let mut waits = Watchdog::new(WatchdogSettings::default());
         waits.latch(Fault::Stalled);
         assert_eq!((waits.check(MS).link, waits.faults()), (Link::Waiting, 0));
+    }
+
+    #[test]
+    fn a_fault_of_before_is_latched_from_the_start() {
+        let mut watchdog = Watchdog::new(WatchdogSettings::default());
+        watchdog.begin_latched(Fault::Device);
+        for tick in 1..300 {
+            watchdog.sample_arrived(tick * MS);
+            let verdict = watchdog.check(tick * MS);
+            assert_eq!((verdict.link, verdict.ramp), (Link::Latched(Fault::Device), 0.0));
+        }
+        assert_eq!(watchdog.faults(), 0);
+        assert!(watchdog.recover());
+        watchdog.sample_arrived(300 * MS);
+        assert_eq!(watchdog.check(300 * MS).link, Link::Fresh);
     }
 
     #[test]

@@ -22,7 +22,7 @@ use std::{
     path::PathBuf,
     sync::{
         Arc, Mutex, MutexGuard, OnceLock, PoisonError, RwLock,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicI32, AtomicU64, Ordering},
     },
 };
 use thiserror::Error;
@@ -102,6 +102,8 @@ pub struct DeviceRecord {
     pub accepted: AtomicU64,
     /// Samples dropped.
     pub rejected: AtomicU64,
+    /// What becomes of the force on its side, as it says (`SafetyState`).
+    pub safety_state: AtomicI32,
     /// When the newest sample came (ns, monotonic), 0: none yet.
     pub newest_ns: AtomicU64,
     force_n_bits: AtomicU64,
@@ -128,6 +130,7 @@ impl DeviceRecord {
             name,
             accepted: AtomicU64::new(0),
             rejected: AtomicU64::new(0),
+            safety_state: AtomicI32::new(0),
             newest_ns: AtomicU64::new(0),
             force_n_bits: AtomicU64::new(0),
             dismissal: OnceLock::new(),

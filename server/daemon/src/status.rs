@@ -101,6 +101,7 @@ fn devices(session: &ActiveSession) -> Vec<v1::AttachedDevice> {
                 samples_rejected: device.rejected.load(Ordering::Relaxed),
                 newest_sample_age_s: age_s,
                 force_n: device.force_n(),
+                safety_state: device.safety_state.load(Ordering::Relaxed),
             }
         })
         .collect()

@@ -124,6 +124,11 @@ impl Program {
         self.signal(rustix::process::Signal::HUP);
     }
 
+    /// Sends SIGUSR1.
+    pub fn recover(&self) {
+        self.signal(rustix::process::Signal::USR1);
+    }
+
     fn signal(&self, signal: rustix::process::Signal) {
         let pid = rustix::process::Pid::from_child(&self.child);
         rustix::process::kill_process(pid, signal).expect("the child runs");

@@ -124,6 +124,38 @@ fn a_killed_daemon_goes_on_at_its_last_autosave() {
     assert!(fs::read(first).unwrap() == fs::read(second).unwrap(), "bit for bit");
 }
 
+/// A bridge that had stopped on a lost arm was started anew by the service manager, and pushed.
+#[test]
+fn a_latched_fault_outlives_the_bridge() {
+    let place = tempfile::tempdir().unwrap();
+    let file = place.path().join("latched");
+    let latch = file.to_str().unwrap();
+    let daemon = Daemon::start(&["ventricle"]);
+    let arguments = ["--server", &daemon.url, "--device", "simulated", "--latch-file", latch];
+    let state = |status: &serde_json::Value| status["devices"][0]["safety_state"].as_str().unwrap_or("").to_owned();
+    fs::write(&file, "device\n").unwrap();
+    for killed in [true, false] {
+        let mut bridge = Program::start("palpate-bridge", &arguments);
+        bridge.wait_for("recover with `kill -USR1", PATIENCE);
+        daemon.wait_until("it says so", |status| state(status) == "SAFETY_STATE_FAULT_LATCHED");
+        if killed {
+            bridge.kill();
+            daemon.wait_until("the tool is free", |status| status["devices"].as_array().is_some_and(Vec::is_empty));
+            assert!(file.exists());
+            continue;
+        }
+        bridge.recover();
+        daemon.wait_until("it operates", |status| state(status) == "SAFETY_STATE_OPERATING");
+        let until = Instant::now() + PATIENCE;
+        while file.exists() {
+            assert!(Instant::now() < until, "what was recovered from is remembered");
+        }
+        bridge.terminate();
+        assert!(bridge.wait(PATIENCE).success());
+    }
+    assert!(!file.exists(), "a stop that was asked for is no fault");
+}
+
 /// The tick that the folder's session was kept at; 0: none is there.
 fn kept_tick(folder: &Path) -> u64 {
     let text = fs::read_to_string(folder.join("session.toml")).unwrap_or_default();

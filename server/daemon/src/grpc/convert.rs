@@ -12,7 +12,10 @@ use palpate_physics::{
     Quarantine,
     contact::{LocalContactModel, LocalTorqueModel},
 };
-use palpate_proto::v1::{self, DeviceFaultCode};
+use palpate_proto::{
+    PROTOCOL_VERSION,
+    v1::{self, DeviceFaultCode},
+};
 use tonic::Status;
 
 /// Longest device name (bytes).
@@ -157,6 +160,12 @@ pub fn device_hello(message: Option<v1::DeviceUp>) -> Result<v1::DeviceHello, St
     if !(hello.max_torque_nm.is_finite() && hello.max_torque_nm >= 0.0) {
         let value = hello.max_torque_nm;
         return Err(Status::invalid_argument(format!("hello.max_torque_nm = {value} must be finite and not negative")));
+    }
+    if hello.protocol_version > PROTOCOL_VERSION {
+        let theirs = hello.protocol_version;
+        return Err(Status::failed_precondition(format!(
+            "this device speaks version {theirs} of the protocol and this daemon version {PROTOCOL_VERSION}: update palpated"
+        )));
     }
     let patience = [
         ("sample_rate_hz", hello.sample_rate_hz, SAMPLE_RATES_HZ, "the usual one, 1000"),

@@ -10,7 +10,10 @@ use crate::{
 };
 use futures_util::{Stream, stream};
 use palpate_physics::contact::Coupling;
-use palpate_proto::v1::{self, device_down::Message, device_server::Device};
+use palpate_proto::{
+    PROTOCOL_VERSION,
+    v1::{self, device_down::Message, device_server::Device},
+};
 use std::{pin::Pin, sync::Arc, time::Duration};
 use tokio::time::timeout;
 use tonic::{Request, Response, Status, Streaming};
@@ -185,5 +188,6 @@ fn welcome(
         }),
         tool_radius_m: spec.radius_m,
         tool_half_length_m: spec.shape.half_length_m(),
+        protocol_version: PROTOCOL_VERSION,
     }
 }

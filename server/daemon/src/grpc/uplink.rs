@@ -147,7 +147,20 @@ impl Uplink {
         self.samples.write(input);
         self.record.accepted.fetch_add(1, Ordering::Relaxed);
         self.record.newest_ns.store(arrived_ns, Ordering::Relaxed);
+        self.tell_safety(sample.safety_state);
         Ok(())
+    }
+
+    /// Notes what the device says of its force; that a fault is latched is logged when it begins.
+    fn tell_safety(&self, state: i32) {
+        if self.record.safety_state.swap(state, Ordering::Relaxed) != state
+            && state == i32::from(v1::SafetyState::FaultLatched)
+        {
+            tracing::warn!(
+                device = self.record.name,
+                "a fault is latched at the device: it has no force until somebody there recovers it"
+            );
+        }
     }
 
     fn report(&self, sample_sequence: u64, rejected: Rejected, counts: &mut BTreeMap<i32, u64>) {
