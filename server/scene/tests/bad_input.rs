@@ -50,6 +50,20 @@ fn the_good_scene_is_good() {
     assert_eq!(scene.summary.tets, 48);
 }
 
+/// A name with escape codes was printed raw, and cleared the terminal of whoever looked.
+#[test]
+fn names_hold_no_escape_codes() {
+    for (from, to, place) in [
+        ("name = \"t\"", "name = \"t\\u001b[2J\"", "t.toml:2:8: "),
+        ("name = \"t\"", "name = \"t\"\ndescription = \"fine\\nas lines go, \\u0007 is not\"", "t.toml:3:15: "),
+        ("name = \"ball\"", "name = \"ball\\n\"", "t.toml:19:8: "),
+        ("name = \"force\"", "name = \"\\u0085force\"", "t.toml:25:8: "),
+    ] {
+        let message = refused(from, to);
+        assert!(message.starts_with(place) && message.contains("control character U+00"), "{message}");
+    }
+}
+
 /// A mesh in millimetres taken for metres loaded without a word.
 #[test]
 fn a_body_in_the_wrong_unit_is_told_with_the_key_to_change() {

@@ -40,6 +40,9 @@ pub(crate) fn compile(
     progress: &mut dyn FnMut(f64, &str),
 ) -> Result<Scene, Fault> {
     files.limits.check_entries(document)?;
+    printable(Where::root("scene").key("name"), &document.scene.name)?;
+    // A description may have several lines.
+    printable(Where::root("scene").key("description"), &document.scene.description.replace(['\n', '\r', '\t'], " "))?;
     let kind = kinds::of(&document.body);
     kind.refuse(document)?;
     if document.body.elements.is_some() && !kind.has_elements() {
@@ -233,6 +236,15 @@ fn exactly_one<'k>(at: &Where, given: &[(&'k str, bool)]) -> Result<&'k str, Fau
     }
 }
 
+/// Refuses control characters: a name goes to terminals, where escape codes act.
+fn printable(at: Where, text: &str) -> Result<(), Fault> {
+    match text.chars().find(|c| c.is_control()) {
+        Some(c) => Err(Fault::value(at, format!("it holds the control character U+{:04X}", u32::from(c)))
+            .help("write letters, digits and signs only")),
+        None => Ok(()),
+    }
+}
+
 /// Refuses two elements of one name.
 fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result<(), Fault> {
     let mut seen: Vec<&str> = Vec::new();
@@ -241,6 +253,7 @@ fn unique_names<'n>(table: &str, names: impl Iterator<Item = &'n str>) -> Result
         if name.trim().is_empty() {
             return Err(Fault::value(at, format!("[[{table}]] {index} has an empty name")));
         }
+        printable(at.clone(), name)?;
         if seen.contains(&name) {
             return Err(Fault::value(at, format!("there are two [[{table}]] named \"{name}\"")).help("rename one"));
         }
