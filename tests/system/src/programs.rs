@@ -108,6 +108,13 @@ impl Program {
         }
     }
 
+    /// Resident memory (bytes).
+    pub fn resident_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).expect("the child runs");
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("the system tells");
+        1024 * line.split_whitespace().next().expect("a number").parse::<u64>().expect("a number")
+    }
+
     /// Sends SIGKILL, and waits for the end.
     pub fn kill(&mut self) {
         self.child.kill().expect("the child runs");
