@@ -102,8 +102,11 @@ fn messages_that_are_announced_take_no_memory() {
 fn silent_connections_keep_nobody_out() {
     let (daemon, address) = attacked();
     let most = rustix::process::getrlimit(rustix::process::Resource::Nofile);
-    rustix::process::setrlimit(rustix::process::Resource::Nofile, rustix::process::Rlimit { current: most.maximum, ..most })
-        .unwrap();
+    rustix::process::setrlimit(
+        rustix::process::Resource::Nofile,
+        rustix::process::Rlimit { current: most.maximum, ..most },
+    )
+    .unwrap();
     let silent: Vec<_> = (0..2000).map(|_| TcpStream::connect(address)).collect();
     let connected = silent.iter().filter(|socket| socket.is_ok()).count();
     println!("{connected} silent connections");

@@ -19,3 +19,4 @@ pub mod schema;
 pub mod simulate;
 mod summary;
 mod walls;
+mod whole_rows;

@@ -1,4 +1,5 @@
 //! Probes as rows: the CSV file, and the last row for the summary.
+use super::whole_rows::WholeRows;
 use glam::DVec3;
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{Model, State};
@@ -6,18 +7,14 @@ use palpate_scene::{
     Probe,
     probes::{MAX_COLUMNS, Measure},
 };
-use std::{
-    fs::File,
-    io::{BufWriter, Write},
-    path::Path,
-};
+use std::{io::Write, path::Path};
 
 /// Evaluates all probes into one row, and writes it if there is a file.
 pub(super) struct ProbeRows<'s> {
     probes: &'s [Probe],
     row: Vec<f64>,
     peaks: Vec<Peak>,
-    file: Option<BufWriter<File>>,
+    file: Option<WholeRows>,
     count: u64,
 }
 
@@ -81,7 +78,7 @@ impl<'s> ProbeRows<'s> {
         }
         self.count += 1;
         let Some(file) = &mut self.file else { return Ok(()) };
-        write_row(file, time_s, &self.row).into_diagnostic().wrap_err("cannot write probes.csv")
+        file.add(|out| write_row(out, time_s, &self.row)).into_diagnostic().wrap_err("cannot write probes.csv")
     }
 
     /// Rows so far.
@@ -103,15 +100,15 @@ impl<'s> ProbeRows<'s> {
 
     /// Writes what is buffered.
     pub(super) fn flush(&mut self) -> miette::Result<()> {
-        self.file.as_mut().map_or(Ok(()), Write::flush).into_diagnostic().wrap_err("cannot write probes.csv")
+        self.file.as_mut().map_or(Ok(()), WholeRows::flush).into_diagnostic().wrap_err("cannot write probes.csv")
     }
 }
 
-fn create(path: &Path, probes: &[Probe]) -> miette::Result<BufWriter<File>> {
+fn create(path: &Path, probes: &[Probe]) -> miette::Result<WholeRows> {
     let refused = || format!("cannot write {}", path.display());
-    let mut file = BufWriter::new(File::create(path).into_diagnostic().wrap_err_with(refused)?);
+    let mut file = WholeRows::create(path).into_diagnostic().wrap_err_with(refused)?;
     let columns: Vec<String> = std::iter::once("time_s".to_owned()).chain(probes.iter().flat_map(heads)).collect();
-    writeln!(file, "{}", columns.join(",")).into_diagnostic().wrap_err_with(refused)?;
+    file.add(|out| writeln!(out, "{}", columns.join(","))).into_diagnostic().wrap_err_with(refused)?;
     Ok(file)
 }
 

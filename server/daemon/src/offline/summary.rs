@@ -1,5 +1,6 @@
 //! What a run did, as JSON for programs and as lines for people.
 use super::{folder, probe_rows::ProbeRows, say::say, walls::WallNumbers};
+use crate::whole_file::{self, PUBLIC};
 use miette::{IntoDiagnostic, WrapErr};
 use palpate_physics::{AwakeFor, Energies, Model, State, snapshot, world};
 use palpate_scene::{Scene, wording::counted};
@@ -254,7 +255,7 @@ impl Summary {
     pub(super) fn write(&self, out: &Path) -> miette::Result<()> {
         let path = out.join(folder::SUMMARY);
         let text = serde_json::to_string_pretty(self).into_diagnostic()?;
-        std::fs::write(&path, text + "\n")
+        whole_file::write(&path, (text + "\n").as_bytes(), PUBLIC)
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot write {}", path.display()))
     }

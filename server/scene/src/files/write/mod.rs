@@ -80,7 +80,15 @@ fn corners(vertices: &[DVec3], triangle: &[u32; 3]) -> Option<[DVec3; 3]> {
     Some([at(triangle[0])?, at(triangle[1])?, at(triangle[2])?])
 }
 
+/// Writes beside, and then in place: a program that is killed, or a disk that is full, leaves no file in part.
 fn store(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    std::fs::write(path, bytes)
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let written = std::fs::write(&beside, bytes).and_then(|()| std::fs::rename(&beside, path));
+    written
+        .inspect_err(|_| {
+            // Half a file helps nobody; that it may not be there is no second error.
+            let _ = std::fs::remove_file(&beside);
+        })
         .map_err(|error| FileError::new(path, Place::File, Problem::Io { action: "written", error }))
 }
