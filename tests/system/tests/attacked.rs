@@ -124,7 +124,7 @@ fn answers_that_nobody_reads_are_bounded_and_given_back() {
     let asked = |n: u32| {
         let mut socket = begin(address);
         for stream in (1..500).step_by(2) {
-            let path = if (n + stream / 2) % 2 == 0 { "Surface/Watch" } else { "Session/Snapshot" };
+            let path = if (n + stream / 2).is_multiple_of(2) { "Surface/Watch" } else { "Session/Snapshot" };
             let mut bytes = headers(stream, &format!("/palpate.v1.{path}"));
             bytes.extend(data(stream, 0, &[], true));
             // Whoever is sent away hears no more.
