@@ -21,7 +21,7 @@ impl Server {
     /// [`ViewError::Address`], [`ViewError::File`] or [`ViewError::Unreachable`].
     pub async fn connect(&self) -> Result<Connection, ViewError> {
         let endpoint = connect::endpoint(&self.address, &self.credentials)?;
-        let bearer = self.credentials.bearer()?;
+        let bearer = self.credentials.bearer(&self.address)?;
         let unreachable = |reason| ViewError::Unreachable { address: self.address.clone(), reason };
         let channel = endpoint.connect().await.map_err(|error| unreachable(why_unreachable(&error)))?;
         let channel = Connection::new(channel, bearer);

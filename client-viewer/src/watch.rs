@@ -6,7 +6,10 @@ use crate::{
 };
 use clap::Args;
 use palpate_proto::{connect::causes, v1::LevelOfDetail};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::{
+    io::Write as _,
+    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+};
 
 /// Arguments of `watch`.
 #[derive(Debug, Args)]
@@ -79,7 +82,8 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
         if ends.is_some_and(|ends| Instant::now() + pause >= ends) {
             return Err(error);
         }
-        eprintln!("{}; trying again in {} s", causes(&error), pause.as_secs_f64());
+        // A reader that has gone misses it, no more.
+        let _ = writeln!(std::io::stderr(), "{}; trying again in {} s", causes(&error), pause.as_secs_f64());
         attempts += 1;
         tokio::time::sleep(pause).await;
     }
@@ -88,7 +92,7 @@ pub async fn run(server: &Server, arguments: &WatchArguments) -> Result<(), View
 /// Whether a daemon that is started anew may answer otherwise.
 fn may_come_back(error: &ViewError) -> bool {
     match error {
-        ViewError::Unreachable { .. } | ViewError::Lost(_) | ViewError::Stream(_) => true,
+        ViewError::Unreachable { .. } | ViewError::Lost(_) | ViewError::Stream(_) | ViewError::Silent { .. } => true,
         ViewError::Refused { code, .. } => code == "Unavailable",
         _ => false,
     }

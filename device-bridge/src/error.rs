@@ -116,7 +116,7 @@ pub enum BridgeError {
     /// The arm failed in the loop.
     #[error("the arm is lost: {fault}; its force was taken away")]
     #[diagnostic(help(
-        "see to the arm, and start the bridge again: the force comes back slowly. An arm that has stopped answering while other work held \
+        "see to the arm, and start the bridge again: the force comes back slowly, with --latch-file once SIGUSR1 has recovered it. An arm that has stopped answering while other work held \
          this machine up may be well: end that work, or raise silence_s in [device]"
     ))]
     DeviceLost {

@@ -3,7 +3,7 @@ use palpate_control::{Fault, Link};
 use std::{
     fs,
     io::{self, Write as _},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 /// Faults by the name that stands in the file. A stop that was asked for is none.
@@ -21,13 +21,15 @@ const NAMES: [(Fault, &str); 6] = [
 pub struct Latch {
     path: PathBuf,
     remembered: Option<Fault>,
+    /// What went wrong last, which is said once.
+    said: String,
 }
 
 impl Latch {
     /// What is remembered there. A file that cannot be understood means a fault.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// When it cannot be read, or its folder not be written.
     pub fn at(path: PathBuf) -> io::Result<Self> {
         let remembered = match fs::read_to_string(&path) {
             Ok(text) => {
@@ -38,7 +40,17 @@ impl Latch {
             Err(error) if error.kind() == io::ErrorKind::NotFound => None,
             Err(error) => return Err(error),
         };
-        Ok(Self { path, remembered })
+        let latch = Self { path, remembered, said: String::new() };
+        // A place that cannot be written is told now, and not when there is something to remember.
+        fs::write(latch.beside(), "")?;
+        fs::remove_file(latch.beside())?;
+        Ok(latch)
+    }
+
+    fn beside(&self) -> PathBuf {
+        let mut beside = self.path.clone().into_os_string();
+        beside.push(".part");
+        beside.into()
     }
 
     /// The fault that is remembered.
@@ -46,11 +58,19 @@ impl Latch {
         self.remembered
     }
 
-    /// Remembers what is latched, and forgets what was recovered from.
-    ///
-    /// # Errors
-    /// When the file cannot be written or removed.
-    pub fn follow(&mut self, link: Link) -> io::Result<()> {
+    /// Remembers what is latched, and forgets what was recovered from. What goes wrong is said once, and tried again.
+    pub fn follow(&mut self, link: Link) {
+        let said = match self.try_follow(link) {
+            Ok(()) => String::new(),
+            Err(error) => format!("the latched fault is not remembered in {}: {error}", self.path.display()),
+        };
+        if !said.is_empty() && said != self.said {
+            tracing::error!("{said}");
+        }
+        self.said = said;
+    }
+
+    fn try_follow(&mut self, link: Link) -> io::Result<()> {
         let now = match link {
             // A stop that was asked for is no fault, and one that is on its way is not recovered from.
             Link::Latched(Fault::Requested) | Link::Ramping(_) => return Ok(()),
@@ -73,12 +93,13 @@ impl Latch {
 
     /// Beside, to the disk, and then in place.
     fn write(&self, name: &str) -> io::Result<()> {
-        let mut beside = self.path.clone().into_os_string();
-        beside.push(".part");
-        let mut file = fs::File::create(&beside)?;
+        let mut file = fs::File::create(self.beside())?;
         writeln!(file, "{name}")?;
         file.sync_all()?;
-        fs::rename(&beside, &self.path)
+        fs::rename(self.beside(), &self.path)?;
+        // The new name is on the disk as well.
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        fs::File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
     }
 }
 
@@ -100,7 +121,7 @@ mod tests {
             (Link::Waiting, None),
             (Link::Latched(Fault::Device), Some(Fault::Device)),
         ] {
-            latch.follow(link).unwrap();
+            latch.follow(link);
             assert_eq!(Latch::at(path.clone()).unwrap().remembered(), after, "{link:?}");
         }
         for (fault, name) in NAMES {
@@ -110,5 +131,11 @@ mod tests {
         // Half a word of a disk that was full.
         fs::write(&path, "sta").unwrap();
         assert_eq!(Latch::at(path).unwrap().remembered(), Some(Fault::Stalled));
+    }
+
+    #[test]
+    fn a_place_that_cannot_be_written_is_told_at_the_start() {
+        assert!(Latch::at("/nowhere/latched".into()).is_err());
+        assert!(Latch::at("/proc/latched".into()).is_err());
     }
 }

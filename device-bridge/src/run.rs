@@ -133,6 +133,8 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
     let mut law = ServoLaw::new(settings.servo);
     if let Some(fault) = latch.as_ref().and_then(Latch::remembered).filter(|_| !settings.servo.auto_recover) {
         law.begin_latched(fault);
+        // Before the first tick, too, it is what is so.
+        shared.stats.set_link(Link::Latched(fault));
     }
     let servo = Servo {
         law,
@@ -204,7 +206,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
 fn latch(settings: &Settings) -> Result<Option<Latch>, BridgeError> {
     let at = |path: &PathBuf| {
         Latch::at(path.clone()).map_err(|source| BridgeError::Read {
-            what: "the file that remembers a latched fault,",
+            what: "or write beside the file that remembers a latched fault,",
             path: path.clone(),
             source,
         })
@@ -215,9 +217,7 @@ fn latch(settings: &Settings) -> Result<Option<Latch>, BridgeError> {
 /// Writes down what is latched now. Before the first tick nothing is known of the link.
 fn remember(latch: Option<&mut Latch>, shared: &Shared) {
     let Some(latch) = latch.filter(|_| shared.stats.summary().ticks > 0) else { return };
-    if let Err(error) = latch.follow(shared.stats.link()) {
-        tracing::error!("a latched fault is not remembered: {error}");
-    }
+    latch.follow(shared.stats.link());
 }
 
 /// Starts the thread that the stream to the daemon is on, with a priority right below the servo's: other programs of the machine, and

@@ -71,14 +71,20 @@ pub struct Credentials {
 }
 
 impl Credentials {
-    /// What puts the token into every call.
+    /// What puts the token into every call to this address. By TLS only: sent in the clear it would be anybody's, and daemons that
+    /// are reached so ask for none.
     ///
     /// # Errors
     /// [`ConnectError::Token`].
-    pub fn bearer(&self) -> Result<Bearer, ConnectError> {
-        let header = self.token.as_ref().map(|token| format!("Bearer {}", token.trim()).parse());
+    pub fn bearer(&self, address: &str) -> Result<Bearer, ConnectError> {
+        let token = self.token.as_deref().map(str::trim).filter(|token| !token.is_empty() && is_tls(address));
+        let header = token.map(|token| format!("Bearer {token}").parse());
         header.transpose().map(Bearer).map_err(|_| ConnectError::Token)
     }
+}
+
+fn is_tls(address: &str) -> bool {
+    address.starts_with("https://")
 }
 
 /// Puts a token, if there is one, into every call.
@@ -116,8 +122,8 @@ pub fn endpoint(address: &str, credentials: &Credentials) -> Result<Endpoint, Co
     if scheme != Some("unix") && endpoint.uri().port_u16().is_none() {
         return Err(bad("it names no port, 1 to 65535; `palpated` takes 7411 unless it is told another".to_owned()));
     }
-    if scheme != Some("https") && (credentials.certificate.is_some() || credentials.token.is_some()) {
-        return Err(bad("a certificate or a token is shown by https:// only".to_owned()));
+    if scheme != Some("https") && credentials.certificate.is_some() {
+        return Err(bad("a certificate is shown by https:// only".to_owned()));
     }
     match (credentials.authority.as_deref(), scheme) {
         (None, Some("https")) => {
@@ -253,13 +259,19 @@ mod tests {
     /// A token sent in the clear is anybody's.
     #[test]
     fn what_tells_a_client_apart_is_shown_by_tls_only() {
-        let token = Credentials { token: Some("palpate1.x".into()), ..Credentials::default() };
         let own = Credentials { certificate: Some(("a.pem".into(), "a.key".into())), ..Credentials::default() };
-        for credentials in [token, own] {
-            let refusal = endpoint("http://host:7411", &credentials).unwrap_err().to_string();
-            assert!(refusal.contains("https:// only"), "{refusal}");
+        let refusal = endpoint("http://host:7411", &own).unwrap_err().to_string();
+        assert!(refusal.contains("https:// only"), "{refusal}");
+        let with = |token: &str| Credentials { token: Some(token.to_owned()), ..Credentials::default() };
+        for (token, address, is_shown) in [
+            ("palpate1.x", "https://host:7411", true),
+            ("palpate1.x", "http://host:7411", false),
+            ("palpate1.x", "unix:///run/palpate.sock", false),
+            // A variable that is there and empty.
+            ("", "https://host:7411", false),
+        ] {
+            assert_eq!(with(token).bearer(address).unwrap().0.is_some(), is_shown, "{token} {address}");
         }
-        let broken = Credentials { token: Some("palpate1\nx".into()), ..Credentials::default() };
-        assert!(matches!(broken.bearer(), Err(ConnectError::Token)));
+        assert!(matches!(with("palpate1\nx").bearer("https://host:7411"), Err(ConnectError::Token)));
     }
 }

@@ -165,7 +165,7 @@ fn uplink(config: &Config) -> Result<UplinkSettings, BridgeError> {
     let credentials = Credentials { authority: server.tls_ca.clone(), certificate, token: server.token.clone() };
     Ok(UplinkSettings {
         endpoint: connect::endpoint(&server.url, &credentials).map_err(unusable)?,
-        bearer: credentials.bearer().map_err(unusable)?,
+        bearer: credentials.bearer(&server.url).map_err(unusable)?,
         address: server.url.clone(),
         tool: server.tool.clone(),
         device_name: server.device_name.clone(),

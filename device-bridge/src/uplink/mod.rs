@@ -298,11 +298,13 @@ impl Uplink {
         use v1::DeviceFaultCode::{Detached, Dismissed, Quarantined};
         self.shared.stats.peer_faults.increment();
         let text = format!("the daemon reports: {}", fault.message);
-        let stops = matches!(fault.code(), Detached | Dismissed | Quarantined);
         if fault.code() == Dismissed {
-            // It is what the bridge ends with, and says then.
+            // It is what the bridge ends with, and says then; the force is gone already.
             told.dismissed = Some(fault.message.clone());
-        } else if stops {
+            return;
+        }
+        let stops = matches!(fault.code(), Detached | Quarantined);
+        if stops {
             // It tells each of these once itself.
             tracing::warn!("{text}");
         } else {

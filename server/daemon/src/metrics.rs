@@ -172,8 +172,10 @@ impl Read {
         if let Some(bytes) = resident_bytes() {
             metric("resident_memory_bytes", "Memory of the process").gauge(encoder, bytes as f64)?;
         }
-        if let Some(age_s) = self.0.autosave.as_ref().and_then(|autosave| autosave.age_s(Clock::Monotonic.now_ns())) {
-            metric("autosave_age", "Age of the newest autosave").seconds().gauge(encoder, age_s)?;
+        if let Some(autosave) = &self.0.autosave {
+            metric("autosave_age", "Age of the newest autosave; before the first, time since the start")
+                .seconds()
+                .gauge(encoder, autosave.unsaved_s())?;
         }
         let version = vec![("version", env!("CARGO_PKG_VERSION").to_owned())];
         metric("build", "1; the label says which version runs").gauges(encoder, &[(version, 1.0)])

@@ -59,7 +59,7 @@ impl Guarded {
     async fn connect(&self, credentials: Credentials) -> Connection {
         let credentials = Credentials { authority: Some(self.keys.authority()), ..credentials };
         let channel = endpoint(&self.url(), &credentials).unwrap().connect().await.unwrap();
-        Connection::new(channel, credentials.bearer().unwrap())
+        Connection::new(channel, credentials.bearer(&self.url()).unwrap())
     }
 
     fn certificate(&self, name: &str, roles: Roles) -> (PathBuf, PathBuf) {
@@ -145,6 +145,39 @@ async fn every_forbidden_pair_of_role_and_call_is_denied() {
     };
     assert!(refused);
     assert!(daemon.running.daemon.refusals.of(Reason::Forbidden) > 50);
+    daemon.finish().await;
+}
+
+/// On the arms' lane a call without gRPC's content type was taken for the page's, and got the tool.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_arms_lane_asks_as_well_whatever_a_call_claims_to_be() {
+    use palpate_proto::connect::connect_arm;
+    use tower::ServiceExt as _;
+    let daemon = Guarded::new(|_| ()).await;
+    let url = daemon.url();
+    let nobody = Credentials { authority: Some(daemon.keys.authority()), ..Credentials::default() };
+    let viewer =
+        Credentials { certificate: Some(daemon.certificate("anna", Roles::of(&[Role::Viewer]))), ..nobody.clone() };
+    for (credentials, code) in [(&nobody, Code::Unauthenticated), (&viewer, Code::PermissionDenied)] {
+        for kind in ["application/grpc", "text/plain", "application/grpc-web-text", ""] {
+            let channel = connect_arm(&endpoint(&url, credentials).unwrap(), &url).await.unwrap();
+            let mut ask = http::Request::post("/palpate.v1.Device/Attach").header("te", "trailers");
+            if !kind.is_empty() {
+                ask = ask.header("content-type", kind);
+            }
+            let hello = [&[0, 0, 0, 0, 2][..], &[0x0a, 0]].concat();
+            let body = tonic::body::Body::new(http_body_util::Full::new(bytes::Bytes::from(hello)));
+            let response = channel.oneshot(ask.body(body).unwrap()).await.unwrap();
+            let status = Status::from_header_map(response.headers()).expect("refused at once");
+            assert_eq!(status.code(), code, "{kind}: {status:?}");
+        }
+    }
+    // Who is an arm is one there, too.
+    let left = Credentials { certificate: Some(daemon.certificate("left", Roles::of(&[Role::Device]))), ..nobody };
+    let channel = connect_arm(&endpoint(&url, &left).unwrap(), &url).await.unwrap();
+    let mut arm = attach(Connection::new(channel, left.bearer(&url).unwrap())).await;
+    arm.welcome().await;
+    arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }
 

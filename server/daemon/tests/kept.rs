@@ -95,6 +95,10 @@ async fn a_session_is_kept_from_time_to_time_and_before_another_takes_its_place(
 async fn a_quarantined_state_takes_no_good_ones_place() {
     let place = tempfile::tempdir().unwrap();
     let daemon = Daemon::with(pressed_scene(4), config(place.path(), Duration::from_millis(20), None)).await;
+    let until = tokio::time::Instant::now() + PATIENCE;
+    while daemon.status().await.autosave_age_s.is_none() {
+        assert!(tokio::time::Instant::now() < until);
+    }
     daemon.break_the_body().await;
     let until = tokio::time::Instant::now() + PATIENCE;
     while daemon.status().await.quarantine.is_empty() {
@@ -103,25 +107,40 @@ async fn a_quarantined_state_takes_no_good_ones_place() {
     tokio::time::sleep(Duration::from_millis(100)).await;
     daemon.finish().await;
     let kept = KeptFolder::at(place.path()).read(Slot::Newest).unwrap();
-    if let Some(kept) = kept {
-        let again = Daemon::with(pressed_scene(4), config(place.path(), NEVER, Some(kept))).await;
-        assert_eq!(again.status().await.quarantine, "");
-        again.finish().await;
-    }
+    let kept = kept.expect("the good one is there");
+    let again = Daemon::with(pressed_scene(4), config(place.path(), NEVER, Some(kept))).await;
+    assert_eq!(again.status().await.quarantine, "");
+    again.finish().await;
 }
 
+/// A kept session of another body was a daemon that did not start.
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_not_of_the_scene_is_refused_with_the_next_step() {
-    let place = tempfile::tempdir().unwrap();
-    let daemon = Daemon::with(pressed_scene(2), config(place.path(), NEVER, None)).await;
-    daemon.finish().await;
-    let kept = KeptFolder::at(place.path()).read(Slot::Newest).unwrap().unwrap();
-    let broken = Kept { state_hash: kept.state_hash ^ 1, ..kept.clone() };
-    for (scene, kept) in [(block_scene("another", 3), kept), (pressed_scene(2), broken)] {
-        let refused =
-            start(config(place.path(), NEVER, Some(kept)), scene, CancellationToken::new()).await.unwrap_err();
-        assert!(matches!(refused, ServeError::Resume { .. }), "{refused:?}");
-        let help = miette::Diagnostic::help(&refused).unwrap().to_string();
-        assert!(help.contains("without --resume"), "{help}");
+async fn what_is_not_of_the_scene_is_set_aside_and_the_scene_begins_at_rest() {
+    for (scene, spoil) in [(block_scene("another", 3), 0), (pressed_scene(2), 1)] {
+        let place = tempfile::tempdir().unwrap();
+        let kept_in = KeptFolder::at(place.path());
+        let daemon = Daemon::with(pressed_scene(2), config(place.path(), NEVER, None)).await;
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        daemon.finish().await;
+        let mut kept = kept_in.read(Slot::Newest).unwrap().unwrap();
+        kept.state_hash ^= spoil;
+        let began = Daemon::with(scene, config(place.path(), NEVER, Some(kept.clone()))).await;
+        assert!(began.status().await.tick < kept.tick + 20, "it begins at rest");
+        assert_eq!(kept_in.read(Slot::Newest).unwrap(), None);
+        let aside = KeptFolder::at(&place.path().join("refused")).read(Slot::Newest).unwrap().unwrap();
+        assert_eq!((aside.tick, aside.state), (kept.tick, kept.state), "nothing is lost");
+        began.finish().await;
     }
+    // Without a folder there is nowhere to set it aside.
+    let bare = |resume| ServeConfig { resume, autosave: None, ..config(Path::new("nowhere"), NEVER, None) };
+    let nonsense = Kept {
+        source: Source::Named("pressed".into()),
+        state: vec![7; 9],
+        state_hash: 0,
+        tick: 1,
+        time_s: 0.0,
+        paused: false,
+    };
+    let refused = start(bare(Some(nonsense)), pressed_scene(2), CancellationToken::new()).await.unwrap_err();
+    assert!(matches!(refused, ServeError::Resume { .. }), "{refused:?}");
 }

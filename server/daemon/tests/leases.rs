@@ -50,7 +50,20 @@ async fn a_slow_device_that_says_so_is_not_stale_between_its_samples() {
     }
     assert!(faults.iter().all(|fault| fault.code() != DeviceFaultCode::Stale), "{faults:?}");
     assert!(force_n.z > 0.1, "{force_n}");
-    drop(slow);
+    // It goes quiet as it moves: where it would be is believed for a few milliseconds, and the force is gone before the tool.
+    slow.sequence += 1;
+    let mut moving = sample(slow.sequence, above());
+    moving.twist.as_mut().unwrap().linear_m_per_s = Some(v1::Vec3 { z: -0.5, ..Default::default() });
+    slow.send(moving).await;
+    let mut lowest_m = f64::INFINITY;
+    while let Ok(Some(message)) = slow.next().await {
+        if let Message::Command(command) = message {
+            lowest_m = lowest_m.min(command.proxy_position_m.unwrap().z);
+            force_n = force_of(&command);
+        }
+    }
+    assert_eq!(force_n, DVec3::ZERO, "before the tool");
+    assert!(lowest_m > above().z - 0.02, "{lowest_m} m, {} m", above().z);
     // What it asks for counts, in bounds.
     let mut asks = loop {
         let mut asks = daemon.attach(v1::DeviceHello { pose_valid_for_s: 0.03, ..hello() }).await;
@@ -105,6 +118,8 @@ async fn an_order_takes_the_tool_from_a_device() {
     }
     assert!(goodbye.unwrap().message.contains("palpate-view detach"));
     assert_eq!(forces_n.last(), Some(&0.0));
+    // The loop ramps at once: it does not go on until the stream does so in its place.
+    assert!(forces_n.len() < 200, "{} commands before the last", forces_n.len());
     let peak_n = forces_n.iter().copied().fold(0.0, f64::max);
     let falls = forces_n.windows(2).filter(|pair| pair[1] < pair[0]).count();
     let steepest_n = forces_n.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max);

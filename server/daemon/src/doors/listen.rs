@@ -4,7 +4,7 @@ use miette::Diagnostic;
 use std::{
     fs, io,
     net::SocketAddr,
-    os::unix::fs::{FileTypeExt as _, PermissionsExt as _},
+    os::unix::fs::{DirBuilderExt as _, FileTypeExt as _, PermissionsExt as _},
     path::{Path, PathBuf},
 };
 use thiserror::Error;
@@ -50,6 +50,17 @@ pub enum ListenError {
     Group {
         /// As given.
         group: String,
+    },
+    /// The Unix socket cannot be given to the group.
+    #[error("the Unix socket cannot be given to the group \"{group}\"")]
+    #[diagnostic(help(
+        "the daemon's user has to be in that group (usermod -aG), and a systemd unit must not have PrivateUsers=yes"
+    ))]
+    GivenAway {
+        /// As given.
+        group: String,
+        /// Why.
+        source: io::Error,
     },
     /// A certificate or key cannot be read.
     #[error("cannot read the {what} {}", path.display())]
@@ -164,11 +175,11 @@ pub async fn tcp(address: SocketAddr) -> Result<(Listener, SocketAddr), ListenEr
     Ok((Listener::Tcp(incoming), bound))
 }
 
-/// Listens on a Unix socket. A socket that nobody answers on is left over from a daemon that crashed, and replaced. It gets its group
-/// and permissions beside, and then its name: nobody connects before.
+/// Listens on a Unix socket. A socket that nobody answers on is left over from a daemon that crashed, and replaced. It is made in a folder
+/// that only this user enters, gets its group and permissions there, and then its place: nobody connects before.
 ///
 /// # Errors
-/// [`ListenError::Unix`] or [`ListenError::Group`].
+/// [`ListenError::Unix`], [`ListenError::Group`] or [`ListenError::GivenAway`].
 pub async fn unix(socket: &UnixSocket) -> Result<Listener, ListenError> {
     let path = &socket.path;
     let refuse = |source| ListenError::Unix { path: path.clone(), source };
@@ -180,25 +191,32 @@ pub async fn unix(socket: &UnixSocket) -> Result<Listener, ListenError> {
     } else if path.exists() {
         return Err(refuse(io::Error::new(io::ErrorKind::AlreadyExists, "something else is there")));
     }
-    let mut beside = path.clone().into_os_string();
-    beside.push(format!(".{}", std::process::id()));
-    let beside = PathBuf::from(beside);
-    let listener = UnixListener::bind(&beside).map_err(refuse)?;
-    let named = allow(&beside, socket).and_then(|()| fs::rename(&beside, path).map_err(refuse));
-    named.inspect_err(|_| {
-        // That it cannot be removed either is no second error.
-        let _ = fs::remove_file(&beside);
-    })?;
-    Ok(Listener::Unix(listener))
+    let mut own = path.clone().into_os_string();
+    own.push(format!(".{}", std::process::id()));
+    let own = PathBuf::from(own);
+    fs::DirBuilder::new().mode(0o700).create(&own).map_err(refuse)?;
+    let made = make_in(&own, socket);
+    // What is left of it, if anything, helps nobody; that it cannot be removed is no second error.
+    let _ = fs::remove_file(own.join(SOCKET));
+    let _ = fs::remove_dir(&own);
+    made.map(Listener::Unix)
 }
 
-/// Gives a socket its group and permissions.
-fn allow(at: &Path, socket: &UnixSocket) -> Result<(), ListenError> {
+const SOCKET: &str = "socket";
+
+/// Makes a socket in a folder, and moves it to its place.
+fn make_in(folder: &Path, socket: &UnixSocket) -> Result<UnixListener, ListenError> {
     let refuse = |source| ListenError::Unix { path: socket.path.clone(), source };
-    fs::set_permissions(at, fs::Permissions::from_mode(socket.mode)).map_err(refuse)?;
-    let Some(group) = &socket.group else { return Ok(()) };
-    let number = group_number(group)?;
-    std::os::unix::fs::chown(at, None, Some(number)).map_err(refuse)
+    let beside = folder.join(SOCKET);
+    let listener = UnixListener::bind(&beside).map_err(refuse)?;
+    if let Some(group) = &socket.group {
+        let number = group_number(group)?;
+        std::os::unix::fs::chown(&beside, None, Some(number))
+            .map_err(|source| ListenError::GivenAway { group: group.clone(), source })?;
+    }
+    fs::set_permissions(&beside, fs::Permissions::from_mode(socket.mode)).map_err(refuse)?;
+    fs::rename(&beside, &socket.path).map_err(refuse)?;
+    Ok(listener)
 }
 
 /// The number of a group, by its name or already one.

@@ -76,7 +76,7 @@ impl Guard {
 }
 
 /// Whether a path is of a service's method, such as `/palpate.v1.Session/Pause`; the page has files whose names begin so.
-fn is_call(path: &str) -> bool {
+pub fn is_call(path: &str) -> bool {
     let service = path.trim_start_matches('/').split_once('/').map_or("", |(service, _)| service);
     service.starts_with("palpate.v1.") || service.starts_with("grpc.")
 }

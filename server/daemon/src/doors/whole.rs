@@ -25,7 +25,7 @@ const PREFIX_BYTES: usize = 5;
 /// What a request may have beside its one message: its prefix, and trailers of gRPC-web.
 const BESIDE_BYTES: usize = 1024;
 /// The stream of a device.
-pub(super) const ATTACH: &str = "/palpate.v1.Device/Attach";
+pub const ATTACH: &str = "/palpate.v1.Device/Attach";
 /// What begins trailers of gRPC-web, in a message's place.
 const TRAILERS: u8 = 0x80;
 /// A permit of [`Gate::room`] is for so many bytes.

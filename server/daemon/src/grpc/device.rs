@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     session::{ActiveSession, Daemon, DeviceRecord, Dismissal, ToolSeat},
+    sim::tool::ArmLimits,
     who::gate::Expiry,
 };
 use futures_util::{Stream, stream};
@@ -96,7 +97,7 @@ async fn begin(
     let max_force_n = hello.max_force_n.min(daemon.settings.limits.force.max_force_n);
     let max_torque_nm = hello.max_torque_nm.min(daemon.settings.limits.torque.max_torque_nm);
     let tick_period_s = session.model.settings().tick_period_s;
-    let patience = Patience::of(&hello, daemon.settings.limits.watchdog.stale_after_s, tick_period_s);
+    let patience = Patience::of(&hello, &daemon.settings.limits, tick_period_s);
     end.shared.set_max_torque_nm(max_torque_nm);
     end.shared.set_stale_after_s(patience.stale_after_s);
     end.shared.attach(attachment, max_force_n);
@@ -124,14 +125,19 @@ struct Patience {
 }
 
 impl Patience {
-    /// What it says of itself, beside the daemon's own patience.
-    fn of(hello: &v1::DeviceHello, own_stale_after_s: f64, tick_period_s: f64) -> Self {
+    /// What it says of itself, beside the daemon's own patience. Where a button has to be held, a device that says nothing any more
+    /// may have been let go of: the daemon's own patience holds.
+    fn of(hello: &v1::DeviceHello, limits: &ArmLimits, tick_period_s: f64) -> Self {
         let said = |value: f64, usual: f64| if value > 0.0 { value } else { usual };
         let period_s = said(hello.sample_rate_hz, USUAL_RATE_HZ).recip();
-        Self {
-            stale_after_s: said(hello.pose_valid_for_s, own_stale_after_s.max(2.0 * period_s)),
-            lease_s: SHORTEST_LEASE_S.max(LEASE_PERIODS * period_s.max(tick_period_s)),
-        }
+        let own = limits.watchdog;
+        let stale_after_s = match limits.hold_to_run {
+            Some(_) => own.stale_after_s,
+            None => said(hello.pose_valid_for_s, own.stale_after_s.max(2.0 * period_s)),
+        };
+        let lease_s = SHORTEST_LEASE_S.max(LEASE_PERIODS * period_s.max(tick_period_s));
+        // The force is gone before the tool is.
+        Self { stale_after_s, lease_s: lease_s.max(stale_after_s + own.ramp_to_zero_s) }
     }
 }
 

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     session::{ActiveSession, Daemon, DeviceRecord, Dismissal},
     sim::exchange::{DeviceInput, ToolEnd, ToolOutput},
+    sparing::Sparing,
 };
 use glam::DVec3;
 use palpate_control::ForceLimits;
@@ -142,6 +143,7 @@ impl Attachment {
             faults: fault_in,
             over: over.clone(),
             lease,
+            of_latches: Sparing::default(),
         };
         let uplink = tokio::spawn(uplink.run(over.clone().drop_guard()));
         Self {
@@ -170,6 +172,9 @@ impl Attachment {
                 Err(End::WayUp) => return self.how_the_way_up_ended().await,
                 Err(End::Daemon(why)) => why,
             };
+            if let Some(end) = &self.end {
+                end.shared.release();
+            }
             self.stage = Stage::Releasing { why, until: Instant::now() + RELEASE_WITHIN };
         }
         if let Stage::Releasing { why, until } = self.stage {

@@ -133,7 +133,12 @@ async fn replace_scene(daemon: &Arc<Daemon>, source: WireSource) -> Result<Arc<A
     if let Some(autosave) = &daemon.autosave {
         autosave.keep(daemon, Slot::Replaced).await;
     }
-    daemon.replace(prepared).await.map_err(refused)
+    let session = daemon.replace(prepared).await.map_err(refused)?;
+    if let Some(autosave) = &daemon.autosave {
+        // Or the old scene would come back after a crash.
+        autosave.keep(daemon, Slot::Newest).await;
+    }
+    Ok(session)
 }
 
 #[tonic::async_trait]

@@ -3,6 +3,7 @@ use super::convert::{self, Rejected};
 use crate::{
     session::{Daemon, DeviceRecord, Dismissal},
     sim::exchange::DeviceInput,
+    sparing::Sparing,
 };
 use palpate_proto::v1::{self, DeviceFaultCode, device_up::Message};
 use palpate_realtime::Clock;
@@ -71,6 +72,8 @@ pub struct Uplink {
     pub over: CancellationToken,
     /// Time without a sample after which the tool is taken from the device.
     pub lease: Duration,
+    /// Lines about a fault that is latched at the device.
+    pub of_latches: Sparing,
 }
 
 /// In so many looks without a sample a lease ends.
@@ -80,20 +83,20 @@ const LOOKS: u32 = 10;
 /// did not tick, a device that sends a sample for each command had none to send.
 #[derive(Debug, Default)]
 struct Silence {
-    accepted: u64,
+    samples: u64,
     ticks: u64,
     looks: u32,
 }
 
 impl Silence {
     /// Whether it has been silent for the time of its lease, after so many samples of its and ticks of the loop.
-    fn look(&mut self, accepted: u64, ticks: u64) -> bool {
-        if accepted != self.accepted {
+    fn look(&mut self, samples: u64, ticks: u64) -> bool {
+        if samples != self.samples {
             self.looks = 0;
         } else if ticks != self.ticks {
             self.looks += 1;
         }
-        (self.accepted, self.ticks) = (accepted, ticks);
+        (self.samples, self.ticks) = (samples, ticks);
         self.looks >= LOOKS
     }
 }
@@ -116,7 +119,9 @@ impl Uplink {
                 message = self.messages.message() => message,
                 _ = looks.tick() => {
                     let ticks = self.daemon.timing.the_loop.ticks();
-                    if silence.look(self.record.accepted.load(Ordering::Relaxed), ticks) {
+                    // One whose samples are refused is not silent.
+                    let samples = [&self.record.accepted, &self.record.rejected].map(|count| count.load(Ordering::Relaxed));
+                    if silence.look(samples.iter().sum(), ticks) {
                         self.record.dismiss(Dismissal::Silent);
                     }
                     continue;
@@ -156,10 +161,14 @@ impl Uplink {
         if self.record.safety_state.swap(state, Ordering::Relaxed) != state
             && state == i32::from(v1::SafetyState::FaultLatched)
         {
-            tracing::warn!(
-                device = self.record.name,
-                "a fault is latched at the device: it has no force until somebody there recovers it"
-            );
+            let device = &self.record.name;
+            self.of_latches.say(|times| {
+                tracing::warn!(
+                    device,
+                    times,
+                    "a fault is latched at the device: it has no force until somebody there recovers it"
+                );
+            });
         }
     }
 

@@ -5,6 +5,7 @@ use crate::{
     sim::command::{Copy, Done, Refusal},
 };
 use palpate_physics::snapshot;
+use palpate_realtime::Clock;
 use std::{
     sync::{
         Arc,
@@ -30,8 +31,10 @@ pub struct Autosave {
     settings: AutosaveSettings,
     /// One at a time: the last to begin is the last to be written.
     writing: Mutex<()>,
-    /// When the last was written (ns, monotonic); 0: none yet.
+    /// When the running session was last written (ns, monotonic); 0: not yet.
     saved_ns: AtomicU64,
+    /// When this began (ns, monotonic).
+    began_ns: u64,
 }
 
 /// Why the session was not kept.
@@ -51,13 +54,19 @@ type Taken = (Arc<ActiveSession>, Box<Copy>, Done);
 impl Autosave {
     /// Nothing is written before it is told to.
     pub fn new(settings: AutosaveSettings) -> Self {
-        Self { settings, writing: Mutex::new(()), saved_ns: AtomicU64::new(0) }
+        Self { settings, writing: Mutex::new(()), saved_ns: AtomicU64::new(0), began_ns: Clock::Monotonic.now_ns() }
     }
 
     /// Age of the newest that was written (s).
     pub fn age_s(&self, now_ns: u64) -> Option<f64> {
         let saved_ns = self.saved_ns.load(Ordering::Relaxed);
         (saved_ns > 0).then(|| now_ns.saturating_sub(saved_ns) as f64 * 1e-9)
+    }
+
+    /// Since when nothing was written (s): as [`Self::age_s`] or, before the first, since the start.
+    pub fn unsaved_s(&self) -> f64 {
+        let now_ns = Clock::Monotonic.now_ns();
+        self.age_s(now_ns).unwrap_or(now_ns.saturating_sub(self.began_ns) as f64 * 1e-9)
     }
 
     /// Keeps the session from time to time, until the daemon stops.
@@ -77,13 +86,13 @@ impl Autosave {
             Ok(None) => return,
             Err(error) => Err(error),
         };
-        self.tell(kept);
+        self.tell(kept, slot);
     }
 
     /// A copy of the session now, for [`Self::keep_last`].
     pub async fn last(&self, daemon: &Daemon) -> Option<Taken> {
         self.take(daemon).await.unwrap_or_else(|error| {
-            self.tell(Err(error));
+            self.tell(Err(error), Slot::Newest);
             None
         })
     }
@@ -91,7 +100,7 @@ impl Autosave {
     /// Keeps what was copied when the daemon began to stop.
     pub async fn keep_last(&self, taken: Taken) {
         let kept = self.write(taken, Slot::Newest).await;
-        self.tell(kept);
+        self.tell(kept, Slot::Newest);
     }
 
     async fn take(&self, daemon: &Daemon) -> Result<Option<Taken>, NotKept> {
@@ -117,10 +126,11 @@ impl Autosave {
         tokio::task::spawn_blocking(write).await.map_err(|_| NotKept::Panic)?.map_err(NotKept::File)
     }
 
-    fn tell(&self, kept: Result<(), NotKept>) {
+    fn tell(&self, kept: Result<(), NotKept>, slot: Slot) {
         match kept {
+            Ok(()) if slot == Slot::Replaced => {}
             Ok(()) => {
-                let now_ns = palpate_realtime::Clock::Monotonic.now_ns();
+                let now_ns = Clock::Monotonic.now_ns();
                 if self.saved_ns.swap(now_ns, Ordering::Relaxed) == 0 {
                     tracing::info!(every_s = self.settings.every.as_secs_f64(), "the session is kept from now on");
                 }

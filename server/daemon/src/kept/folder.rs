@@ -201,6 +201,25 @@ impl KeptFolder {
         whole_file::write(&path, bytes, PUBLIC).map_err(|source| KeptError::File { what: "write", path, source })
     }
 
+    /// Moves what cannot be taken up into the folder `refused`, whole, where another version may take it up; where to.
+    ///
+    /// # Errors
+    /// [`KeptError`].
+    pub fn set_aside(&self) -> Result<PathBuf, KeptError> {
+        let aside = self.path.join("refused");
+        let file = |what, path: &Path, source| KeptError::File { what, path: path.to_owned(), source };
+        fs::create_dir_all(&aside).map_err(|source| file("make the folder", &aside, source))?;
+        let named = self.manifest(Slot::Newest).ok().flatten();
+        let beside = named.into_iter().flat_map(|manifest| [Some(manifest.state), manifest.scene_text]).flatten();
+        for name in beside.filter(|name| is_state(name) || is_scene(name)) {
+            // A text may be the other session's, too; what is missing already is why it is set aside.
+            let _ = fs::copy(self.path.join(&name), aside.join(&name));
+        }
+        let (from, to) = (self.path.join(Slot::Newest.file()), aside.join(Slot::Newest.file()));
+        fs::rename(&from, &to).map_err(|source| file("move", &from, source))?;
+        Ok(aside)
+    }
+
     /// Removes states and scenes that neither session names. What cannot be removed is tried again next time.
     fn sweep(&self) {
         let mut named = BTreeSet::new();
@@ -209,19 +228,36 @@ impl KeptFolder {
                 Ok(manifest) => {
                     named.extend(manifest.into_iter().flat_map(|m| [Some(m.state), m.scene_text]).flatten());
                 }
-                // What it names is not known.
-                Err(_) => return,
+                // What it names is not known; it is of no use to anybody either.
+                Err(KeptError::Content { path, .. }) => {
+                    let _ = fs::rename(&path, path.with_extension("damaged"));
+                }
+                Err(KeptError::File { .. }) => return,
             }
         }
         let Ok(entries) = fs::read_dir(&self.path) else { return };
         for entry in entries.flatten() {
             let Ok(name) = entry.file_name().into_string() else { continue };
-            let is_own = name.starts_with("state-") || name.starts_with("scene-");
-            if is_own && !named.contains(&name) {
+            if (is_state(&name) || is_scene(&name)) && !named.contains(&name) {
                 let _ = fs::remove_file(entry.path());
             }
         }
     }
+}
+
+/// Whether a file is named as this folder names states: `state-TICK-HASH.bin`.
+fn is_state(name: &str) -> bool {
+    let parts = name.strip_prefix("state-").and_then(|rest| rest.strip_suffix(".bin")?.split_once('-'));
+    parts.is_some_and(|(tick, hash)| tick.parse::<u64>().is_ok() && is_hash(hash))
+}
+
+/// Or scenes: `scene-HASH.toml`.
+fn is_scene(name: &str) -> bool {
+    name.strip_prefix("scene-").and_then(|rest| rest.strip_suffix(".toml")).is_some_and(is_hash)
+}
+
+fn is_hash(text: &str) -> bool {
+    text.len() == 16 && text.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
 /// FNV-1a: tells texts apart in the names of their files.
@@ -261,6 +297,32 @@ mod tests {
         assert_eq!(folder.read(Slot::Replaced).unwrap(), Some(first));
         // Two sessions, two states, one text.
         assert_eq!(fs::read_dir(parent.path().join("a/b")).unwrap().count(), 5);
+    }
+
+    /// Files of the user's that are named nearly so were removed.
+    #[test]
+    fn only_the_folders_own_files_are_swept_and_what_is_damaged_stops_nothing() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = KeptFolder::at(parent.path());
+        let own =
+            ["scene-liver.toml", "state-before.bin", "state-12.bin", "state-1-00.bin", "scene-0123456789abcdeg.toml"];
+        for name in own {
+            fs::write(parent.path().join(name), "mine").unwrap();
+        }
+        let scene = || Source::Named("ventricle".into());
+        folder.write(Slot::Replaced, &kept(1, scene())).unwrap();
+        fs::write(parent.path().join("replaced.toml"), "format = ").unwrap();
+        for tick in 2..6 {
+            folder.write(Slot::Newest, &kept(tick, scene())).unwrap();
+        }
+        for name in own {
+            assert!(parent.path().join(name).exists(), "{name}");
+        }
+        // Beside the user's: a state, its session, and the damaged one.
+        assert_eq!(fs::read_dir(parent.path()).unwrap().count(), own.len() + 3);
+        let aside = KeptFolder::at(&folder.set_aside().unwrap());
+        assert_eq!(folder.read(Slot::Newest).unwrap(), None);
+        assert_eq!(aside.read(Slot::Newest).unwrap(), Some(kept(5, scene())));
     }
 
     #[test]

@@ -6,9 +6,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Rows are handed to the disk in blocks of about this size,
+/// Rows are handed to the disk in blocks of about this size.
 const BLOCK_BYTES: usize = 64 * 1024;
-/// and no later than after this time.
+/// A block is handed over by then, however small it is.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
 /// A table on its way to a file.

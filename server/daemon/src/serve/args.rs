@@ -46,9 +46,10 @@ pub struct ServeArgs {
     /// Whoever reaches the daemon by a network may do everything
     #[arg(long, conflicts_with = "pki")]
     pub trust_the_network: bool,
-    /// Largest sum of forces that callers without the role of an operator inject while an arm is attached (N)
-    #[arg(long, value_name = "N", default_value_t = default_limits().max_injected_force_n)]
-    pub max_injected_force_n: f64,
+    /// Largest sum of forces that callers without the role of an operator inject while an arm is attached (N) [default: a quarter of
+    /// --max-force-n]
+    #[arg(long, value_name = "N")]
+    pub max_injected_force_n: Option<f64>,
     /// An arm has force only while this button of it is held (0 is the first)
     #[arg(long, value_name = "BUTTON", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub hold_to_run: Option<u8>,
@@ -146,7 +147,7 @@ impl ServeArgs {
         limits.force.max_force_rate_n_per_s = self.max_force_rate_n_per_s;
         limits.torque.max_torque_nm = self.max_torque_nm;
         limits.torque.max_torque_rate_nm_per_s = self.max_torque_rate_nm_per_s;
-        limits.max_injected_force_n = self.max_injected_force_n;
+        limits.max_injected_force_n = self.max_injected_force_n.unwrap_or(0.25 * self.max_force_n);
         limits.hold_to_run = self.hold_to_run;
         let keys = self.pki.as_deref().map(Folder::at);
         let given = self.tls_cert.clone().zip(self.tls_key.clone());

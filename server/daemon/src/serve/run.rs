@@ -2,7 +2,7 @@
 use super::{Runner, ServeConfig, ServeError, args::ServeArgs, manager::notify, report, start_with};
 use crate::{
     doors::descriptors,
-    kept::folder::Slot,
+    kept::folder::{KeptError, KeptFolder, Slot},
     load,
     progress::Progress,
     sim::thread::Loop,
@@ -39,13 +39,31 @@ pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     if let Some(autosave) = &config.autosave {
         autosave.folder.prepare()?;
         if args.resume {
-            config.resume = autosave.folder.read(Slot::Newest)?;
+            config.resume = match autosave.folder.read(Slot::Newest) {
+                Err(error @ KeptError::Content { .. }) => {
+                    set_aside(&autosave.folder, &error)?;
+                    None
+                }
+                read => read?,
+            };
         }
     }
     let mut show = |fraction: f64, what: &str| bar.show(fraction, what);
-    let loaded = match &config.resume {
-        Some(kept) => load::from_kept(&kept.source, &mut show).map(|scene| (scene, kept.source.clone())),
-        None => load::from_argument(&args.scene, &mut show),
+    let kept = match (&config.resume, &config.autosave) {
+        (Some(kept), Some(autosave)) => match load::from_kept(&kept.source, &mut show) {
+            Ok(scene) => Some((scene, kept.source.clone())),
+            Err(error) => {
+                set_aside(&autosave.folder, &*error)?;
+                None
+            }
+        },
+        _ => None,
+    };
+    let loaded = if let Some(loaded) = kept {
+        Ok(loaded)
+    } else {
+        config.resume = None;
+        load::from_argument(&args.scene, &mut show)
     };
     bar.finish();
     let (scene, source) = loaded?;
@@ -57,11 +75,12 @@ pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     Ok(code)
 }
 
-async fn serve(config: ServeConfig, scene: Scene, runner: Runner) -> Result<ExitCode, ServeError> {
+async fn serve(mut config: ServeConfig, scene: Scene, runner: Runner) -> Result<ExitCode, ServeError> {
     let description = scene.description.clone();
     let stop = CancellationToken::new();
     let signals = Signals::new().map_err(|source| ServeError::System { what: "signal handlers", source })?;
-    let running = start_with(config.clone(), scene, stop.clone(), runner).await?;
+    let resume = config.resume.take();
+    let running = start_with(ServeConfig { resume, ..config.clone() }, scene, stop.clone(), runner).await?;
     // Readers that have gone miss what is said, no more.
     let _ = writeln!(std::io::stdout(), "{}", report::startup(&running, &config, &description));
     notify(&[NotifyState::Ready]);
@@ -85,11 +104,26 @@ async fn serve(config: ServeConfig, scene: Scene, runner: Runner) -> Result<Exit
     Ok(ExitCode::SUCCESS)
 }
 
+/// A kept session that cannot be taken up is no reason to serve nothing, and none to lose it.
+pub(super) fn set_aside(folder: &KeptFolder, error: &dyn std::error::Error) -> Result<(), KeptError> {
+    let aside = folder.set_aside()?;
+    let (error, aside) = (causes(error), aside.display().to_string());
+    tracing::error!(
+        error,
+        aside,
+        "the kept session cannot be taken up again: it is set aside, and the scene begins at rest"
+    );
+    Ok(())
+}
+
 /// Reads again what may change while the daemon runs.
 fn reload(keeper: &Keeper) {
     match keeper.reload() {
-        Ok(()) => tracing::info!("keys and revoked names are read again"),
-        Err(error) => tracing::error!(error = causes(&error), "keys cannot be read again: those of before stay"),
+        Ok(()) => tracing::info!("the key of tokens and the revoked names are read again"),
+        Err(error) => tracing::error!(
+            error = causes(&error),
+            "the key of tokens and the revoked names cannot be read again: those of before stay"
+        ),
     }
 }
 

@@ -1,5 +1,5 @@
 //! Wiring: prepare the session, start the loop, open the doors; and the way back when told to stop.
-use super::{ServeConfig, ServeError};
+use super::{ServeConfig, ServeError, run::set_aside};
 use crate::{
     doors::{Doors, lane::Lane, origin::Guard, whole::Gate},
     grpc,
@@ -97,7 +97,7 @@ pub async fn start_with(
     stop: CancellationToken,
     run: Runner,
 ) -> Result<Running, ServeError> {
-    let config = config.checked()?;
+    let mut config = config.checked()?;
     let keeper = Arc::new(match &config.keys {
         Some(folder) => Keeper::of(folder.clone())?,
         None => Keeper::open(),
@@ -118,10 +118,15 @@ pub async fn start_with(
         prepare((scene, config.source.clone()), &settings, &numbers, &hub, &mut |part| bar.show(part, BUILDING));
     bar.finish();
     let Prepared { mut simulation, session, surface } = prepared?;
-    if let Some(kept) = &config.resume {
-        take_up(&mut simulation, kept)?;
+    // It is not held for as long as the daemon runs.
+    let mut paused = false;
+    if let Some(kept) = config.resume.take() {
+        match (take_up(&mut simulation, &kept), &config.autosave) {
+            (Ok(()), _) => paused = kept.paused,
+            (Err(error), Some(autosave)) => set_aside(&autosave.folder, &error)?,
+            (Err(error), None) => return Err(error),
+        }
     }
-    let paused = config.resume.as_ref().is_some_and(|kept| kept.paused);
     let (desk, orders, clerk) = desk().map_err(|source| ServeError::System { what: "order desk", source })?;
     let timing = Arc::new(Timing::default());
     let sign = StopSign::default();
@@ -234,7 +239,10 @@ async fn until_stopped(
     }
     // The loop still takes orders. Forces do not wait for a copy that takes long.
     let last = match &daemon.autosave {
-        Some(autosave) => timeout(LAST_COPY_WITHIN, autosave.last(&daemon)).await.ok().flatten(),
+        Some(autosave) => timeout(LAST_COPY_WITHIN, autosave.last(&daemon)).await.unwrap_or_else(|_| {
+            tracing::error!("the session could not be copied in time: what was kept before is there still");
+            None
+        }),
         None => None,
     };
     // Device streams wait for zero force by themselves; the loop ramps now.

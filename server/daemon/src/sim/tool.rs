@@ -206,7 +206,7 @@ impl ToolLoop {
             velocity_m_per_s: sample.velocity_m_per_s,
             angular_velocity_rad_per_s: sample.angular_velocity_rad_per_s,
         };
-        let there = extrapolate(&motion, verdict.extrapolate_s, self.watchdog.settings().stale_after_s);
+        let there = extrapolate(&motion, verdict.extrapolate_s, self.limits.watchdog.stale_after_s);
         let target = ToolTarget {
             position_m: there.position_m,
             velocity_m_per_s: there.velocity_m_per_s,

@@ -116,6 +116,7 @@ pub fn run(args: &PkiArgs) -> miette::Result<ExitCode> {
             if !is_name(name) {
                 return Err(FolderError::Name { name: name.clone() }.into());
             }
+            Folder::at(&place.folder).refuse_revoked(name)?;
             let key = Folder::at(&place.folder).token_key()?;
             token::mint(&key, &Identity { name: name.clone(), roles: Roles::of(roles), until: now + HOUR * *hours })
         }

@@ -106,6 +106,11 @@ impl Folder {
     /// [`FolderError`].
     pub fn init(&self, hosts: &[String], now: SystemTime) -> Result<(), FolderError> {
         fs::create_dir_all(&self.path).map_err(|source| self.file("make the folder", &self.path, source))?;
+        if self.authority().exists() && !self.authority_key().exists() {
+            let reason = "its key ca.key is not there: a new authority would make everything that was issued worth nothing. Bring the key \
+                          back, or take ca.pem away as well";
+            return Err(FolderError::Content { path: self.authority(), reason: reason.to_owned() });
+        }
         if !self.authority_key().exists() {
             let mut params = params("Palpate", now, YEARS_10);
             params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
@@ -150,6 +155,7 @@ impl Folder {
         if !is_name(name) {
             return Err(FolderError::Name { name: name.to_owned() });
         }
+        self.refuse_revoked(name)?;
         let files = (into.join(format!("{name}.pem")), into.join(format!("{name}.key")));
         for path in [&files.0, &files.1] {
             if path.exists() {
@@ -191,6 +197,20 @@ impl Folder {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(BTreeSet::new()),
             Err(source) => Err(self.file("read", &path, source)),
         }
+    }
+
+    /// Refuses a name to which nothing can be issued any more.
+    ///
+    /// # Errors
+    /// [`FolderError::Content`].
+    pub fn refuse_revoked(&self, name: &str) -> Result<(), FolderError> {
+        if !self.revoked()?.contains(name) {
+            return Ok(());
+        }
+        let reason = format!(
+            "it names {name}, so that nothing issued to it is worth anything: take it out, or issue to another name"
+        );
+        Err(FolderError::Content { path: self.revoked_path(), reason })
     }
 
     /// Takes everything from a name that was issued to it.
@@ -287,6 +307,11 @@ mod tests {
         assert!(folder.issue("../root", roles, day, now, parent.path()).is_err());
         assert!(folder.revoke("a b").is_err());
         folder.revoke("left-arm").unwrap();
+        let again = tempfile::tempdir().unwrap();
+        assert!(folder.issue("left-arm", roles, day, now, again.path()).unwrap_err().to_string().contains("revoked"));
+        // Where the authority's key is kept elsewhere, no other authority takes its place.
+        fs::rename(folder.authority_key(), again.path().join("ca.key")).unwrap();
+        assert!(folder.init(&["localhost".into()], now).unwrap_err().to_string().contains("ca.key"));
         folder.revoke("anna").unwrap();
         assert_eq!(folder.revoked().unwrap().into_iter().collect::<Vec<_>>(), ["anna", "left-arm"]);
     }

@@ -5,6 +5,7 @@ use super::{
 };
 use crate::{
     doors::{
+        origin,
         refusals::{Peer, Reason, Refusals},
         tls::PeerCertificate,
         whole,
@@ -34,7 +35,7 @@ use tonic::{Code, Status};
 
 /// How often it is looked whether a stream's caller may go on.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
-/// Looks that a stream has to say goodbye, once its caller may not.
+/// Looks that a device's stream has to bring the force to zero and to say goodbye, once its caller may not go on.
 const GOODBYE_LOOKS: u32 = 2;
 
 /// What calls have to pass.
@@ -55,12 +56,14 @@ impl Gate {
 #[derive(Debug, Clone)]
 pub struct Expiry(pub CancellationToken);
 
-/// Lets a call pass, with its caller as an extension, or answers why not. What is no call of a service is the page's.
+/// Lets a call pass, with its caller as an extension, or answers why not. What is no call of a service is the page's. Which it is, its
+/// path says: services answer a call whatever content type it claims.
 pub async fn pass(State(gate): State<Gate>, mut request: Request, next: Next) -> Response {
-    let is_call = whole::is_grpc(request.headers());
-    if !is_call && request.uri().path() != metrics::PATH {
+    let (path, is_grpc) = (request.uri().path(), whole::is_grpc(request.headers()));
+    if !is_grpc && !origin::is_call(path) && path != metrics::PATH {
         return next.run(request).await;
     }
+    let (is_call, is_device) = (path != metrics::PATH, path == whole::ATTACH);
     let peer = request.extensions().get::<Peer>().copied();
     let caller = match gate.admitted(&request) {
         Ok(caller) => caller,
@@ -81,7 +84,18 @@ pub async fn pass(State(gate): State<Gate>, mut request: Request, next: Next) ->
     let mut looks = interval(LOOK_EVERY);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     response.map(|body| {
-        Body::new(Watched { body, keeper: gate.keeper, caller, looks, expiry, goodbye: None, is_web, is_over: false })
+        let goodbye_looks = if is_device { GOODBYE_LOOKS } else { 0 };
+        Body::new(Watched {
+            body,
+            keeper: gate.keeper,
+            caller,
+            looks,
+            expiry,
+            goodbye: None,
+            goodbye_looks,
+            is_web,
+            is_over: false,
+        })
     })
 }
 
@@ -136,6 +150,8 @@ struct Watched {
     expiry: CancellationToken,
     /// Why the caller may not go on, and looks since.
     goodbye: Option<(Refused, u32)>,
+    /// How many looks it has for its goodbye.
+    goodbye_looks: u32,
     is_web: bool,
     is_over: bool,
 }
@@ -190,7 +206,7 @@ impl HttpBody for Watched {
             Poll::Ready(Some(Ok(frame))) => frame.is_trailers(),
             _ => false,
         };
-        if has_ended || looks >= GOODBYE_LOOKS { Poll::Ready(Some(Ok(self.end(refused)))) } else { polled }
+        if has_ended || looks >= self.goodbye_looks { Poll::Ready(Some(Ok(self.end(refused)))) } else { polled }
     }
 
     fn is_end_stream(&self) -> bool {
