@@ -27,7 +27,9 @@ pub enum Control {
     },
     /// Puts the body back to rest at tick 0; ends a quarantine
     Reset,
-    /// Takes a tool from the arm that drives it; the force ramps to zero, and the arm does not come back by itself
+    /// Takes the tool from an arm, which does not come back by itself
+    ///
+    /// Its force ramps to zero first.
     Detach {
         /// Tool of the scene [default: the only one that an arm drives]
         #[arg(default_value = "", hide_default_value = true)]

@@ -46,7 +46,7 @@ enum Command {
     Calibrate(offline::calibrate::CalibrateArgs),
     /// Print the JSON schema of scene files
     Schema,
-    /// Make keys for a daemon that others reach by a network, and say who may do what
+    /// Make keys for a daemon on a network, and say who may do what
     Pki(who::commands::PkiArgs),
 }
 

@@ -63,10 +63,22 @@ fn help(program: &str) -> Help {
         String::from_utf8(output.stdout).unwrap()
     };
     let main = ask(&["--help"]);
-    let commands = main.split_once("Commands:\n").map_or("", |(_, rest)| rest.split("\n\n").next().unwrap_or_default());
-    let names = commands.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
-    let of = names.map(|name| (name.to_owned(), ask(&[name, "--help"]))).collect();
+    let mut of = BTreeMap::new();
+    for name in subcommands(&main) {
+        let own = ask(&[&name, "--help"]);
+        for below in subcommands(&own) {
+            of.insert(format!("{name} {below}"), ask(&[&name, &below, "--help"]));
+        }
+        of.insert(name, own);
+    }
     Help { main, of }
+}
+
+/// Names of subcommands that a help lists.
+fn subcommands(help: &str) -> Vec<String> {
+    let commands = help.split_once("Commands:\n").map_or("", |(_, rest)| rest.split("\n\n").next().unwrap_or_default());
+    let names = commands.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    names.map(str::to_owned).collect()
 }
 
 fn examples(program: &str, help: &Help) -> Vec<Quoted> {
@@ -84,13 +96,18 @@ fn names(text: &str, flag: &str) -> bool {
 /// Subcommand and flags against the program's help; scenes against the built-in ones and the repository.
 fn check_ours(quoted: &Quoted, help: &Help, builtin: &[String]) {
     let (program, arguments) = quoted.words.split_first().unwrap();
-    let command = arguments.first().filter(|word| help.of.contains_key(*word));
-    let text = command.map_or(&help.main, |command| &help.of[command]);
-    let takes_scenes = program == "palpated";
+    // The longest of them: `pki` has commands of its own.
+    let count = (0..=2.min(arguments.len()))
+        .rev()
+        .find(|&n| n == 0 || help.of.contains_key(&arguments[..n].join(" ")))
+        .unwrap_or(0);
+    let command = (count > 0).then(|| arguments[..count].join(" "));
+    let text = command.as_ref().map_or(&help.main, |command| &help.of[command]);
+    let takes_scenes = program == "palpated" && count < 2;
     // Only palpated has a default command, and its argument is a scene.
     let plain = arguments.first().is_some_and(|word| !word.starts_with('-'));
     assert!(command.is_some() || !plain || takes_scenes, "{}: no such command", quoted.place);
-    let operands = &arguments[usize::from(command.is_some())..];
+    let operands = &arguments[count..];
     for (index, word) in operands.iter().enumerate() {
         if word.starts_with('-') {
             let flag = word.split('=').next().unwrap();
