@@ -209,6 +209,7 @@ async fn connections_that_ask_for_nothing_are_closed() {
         daemon_with(Bounds { first_request: SHORT, idle: 2 * SHORT, headers: SHORT, ..Bounds::default() }).await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
+    let staying = arm.staying(above());
     // Nothing; half of HTTP/2's preface; half of a request's headers.
     for said in [&b""[..], b"PRI * HTTP/2.0\r\n", b"GET / HTTP/1.1\r\nHost: localhost\r\nX-A: "] {
         let mut socket = connect(&daemon).await;
@@ -221,6 +222,7 @@ async fn connections_that_ask_for_nothing_are_closed() {
     session.status(v1::StatusRequest::default()).await.unwrap();
     eventually(|| count(&daemon, Reason::Idle) == 1, "it is closed").await;
     session.status(v1::StatusRequest::default()).await.unwrap();
+    let mut arm = staying.back().await;
     arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }
@@ -232,6 +234,7 @@ async fn a_peer_that_does_not_read_its_answers_is_sent_away() {
     let daemon = Daemon::with(kneaded_scene(8), config).await;
     let mut arm = daemon.attach(hello()).await;
     arm.welcome().await;
+    let staying = arm.staying(above());
     // By HTTP/2, with windows as large as there are, and no byte of theirs is read.
     let socket = TcpSocket::new_v4().unwrap();
     socket.set_recv_buffer_size(4096).unwrap();
@@ -259,6 +262,7 @@ async fn a_peer_that_does_not_read_its_answers_is_sent_away() {
     eventually(|| daemon.running.as_ref().unwrap().daemon.hub.viewer_count() == 60, "60 viewers").await;
     eventually(|| count(&daemon, Reason::Mute) == 1, "they are sent away").await;
     eventually(|| daemon.running.as_ref().unwrap().daemon.hub.viewer_count() == 0, "their places are free").await;
+    let mut arm = staying.back().await;
     arm.hold_until(above(), |command| command.sample_sequence > 0).await;
     daemon.finish().await;
 }

@@ -19,6 +19,9 @@ use tokio::{
 };
 use tokio_util::sync::CancellationToken;
 
+/// Threads for what takes long: copies of states, scenes that are loaded, files.
+const MOST_BLOCKING_THREADS: usize = 12;
+
 /// Serves a scene until it is told to stop.
 ///
 /// # Errors
@@ -68,7 +71,12 @@ pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     bar.finish();
     let (scene, source) = loaded?;
     config.source = Some(source);
-    let runtime = runtime::Builder::new_multi_thread().enable_all().build().into_diagnostic()?;
+    // Their stacks are locked in memory, and each has a heap of its own: no more than there is work for at a time.
+    let runtime = runtime::Builder::new_multi_thread()
+        .max_blocking_threads(MOST_BLOCKING_THREADS)
+        .enable_all()
+        .build()
+        .into_diagnostic()?;
     let code = runtime.block_on(serve(config, scene, runner))?;
     // What still hangs on a socket is not waited for.
     runtime.shutdown_background();

@@ -18,7 +18,7 @@ const INJECTORS: Who = Who::With(Roles::of(&[Role::Injector, Role::Operator]));
 const DEVICES: Who = Who::With(Roles::of(&[Role::Device]));
 
 /// Every call, and who may make it.
-pub const TABLE: [(&str, Who); 18] = [
+pub const TABLE: [(&str, Who); 17] = [
     ("/palpate.v1.Device/Attach", DEVICES),
     ("/palpate.v1.Surface/Watch", WATCHERS),
     ("/palpate.v1.Session/List", EVERY_ROLE),
@@ -33,7 +33,6 @@ pub const TABLE: [(&str, Who); 18] = [
     ("/palpate.v1.Session/InjectForces", INJECTORS),
     (metrics::PATH, WATCHERS),
     ("/grpc.health.v1.Health/Check", Who::Anybody),
-    ("/grpc.health.v1.Health/List", Who::Anybody),
     ("/grpc.health.v1.Health/Watch", EVERY_ROLE),
     ("/grpc.reflection.v1.ServerReflection/ServerReflectionInfo", EVERY_ROLE),
     ("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", EVERY_ROLE),

@@ -265,6 +265,19 @@ pub fn dvec3(v: v1::Vec3) -> DVec3 {
     DVec3::new(v.x, v.y, v.z)
 }
 
+/// An arm that goes on by itself.
+pub struct Staying {
+    over: CancellationToken,
+    task: tokio::task::JoinHandle<Arm>,
+}
+
+impl Staying {
+    pub async fn back(self) -> Arm {
+        self.over.cancel();
+        self.task.await.unwrap()
+    }
+}
+
 /// A device's stream, by hand.
 pub struct Arm {
     pub up: mpsc::Sender<v1::DeviceUp>,
@@ -300,6 +313,20 @@ impl Arm {
     pub async fn move_to(&mut self, position_m: DVec3) {
         self.sequence += 1;
         self.send(sample(self.sequence, position_m)).await;
+    }
+
+    /// Stays at a place, as an arm does whatever else goes on, until what is returned is told to give it back.
+    pub fn staying(mut self, position_m: DVec3) -> Staying {
+        let over = CancellationToken::new();
+        let told = over.clone();
+        let task = tokio::spawn(async move {
+            while !told.is_cancelled() {
+                let newest = self.sequence;
+                self.hold_until(position_m, |command| command.sample_sequence > newest).await;
+            }
+            self
+        });
+        Staying { over, task }
     }
 
     /// The next command; faults on the way are collected.
