@@ -77,7 +77,9 @@ fn help(program: &str) -> Help {
 /// Names of subcommands that a help lists.
 fn subcommands(help: &str) -> Vec<String> {
     let commands = help.split_once("Commands:\n").map_or("", |(_, rest)| rest.split("\n\n").next().unwrap_or_default());
-    let names = commands.lines().filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
+    // Lines that are further in go on with what is said of the one before.
+    let names = commands.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| !line.starts_with(' '));
+    let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
     names.map(str::to_owned).collect()
 }
 
