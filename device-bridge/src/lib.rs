@@ -25,6 +25,7 @@ pub mod settings;
 pub mod stats;
 pub mod uplink;
 pub mod vrpn_server;
+mod watcher;
 
 pub use config::Config;
 pub use error::BridgeError;

@@ -448,32 +448,3 @@ async fn a_unix_socket_alone_is_for_those_who_may_open_it() {
     assert!(refused.to_string().contains("no such group"), "{refused}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
 }
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_arm_has_force_while_its_button_is_held() {
-    let mut config = ServeConfig::in_process();
-    config.limits.hold_to_run = Some(2);
-    let daemon = common::Daemon::with(block_scene("held", 3), config).await;
-    let mut arm = daemon.attach(hello()).await;
-    arm.welcome().await;
-    let mut faults = Vec::new();
-    let mut hold = async |buttons: u32, place: DVec3, samples: u32, faults: &mut Vec<v1::DeviceFault>| {
-        let mut force_n = DVec3::ZERO;
-        for _ in 0..samples {
-            arm.sequence += 1;
-            arm.send(v1::DeviceSample { buttons, ..sample(arm.sequence, place) }).await;
-            force_n = force_of(&arm.command(faults).await);
-        }
-        force_n
-    };
-    let others = !(1 << 2);
-    hold(others, above(), 400, &mut faults).await;
-    assert_eq!(hold(others, pressing(), 300, &mut faults).await, DVec3::ZERO, "another button is not this one");
-    let told = |faults: &[v1::DeviceFault]| faults.iter().filter(|f| f.code() == DeviceFaultCode::NotHeld).count();
-    assert_eq!(told(&faults), 1);
-    let held_n = hold(1 << 2, pressing(), 400, &mut faults).await;
-    assert!(held_n.z > 0.1, "{held_n}");
-    assert_eq!(hold(0, pressing(), 40, &mut faults).await, DVec3::ZERO);
-    assert_eq!(told(&faults), 2);
-    daemon.finish().await;
-}

@@ -1,9 +1,10 @@
-//! How long a device may be silent, and how it loses its tool.
+//! What an arm has to do to keep its tool and its force: how long it may be silent, how it loses its tool, and a button that is to be held.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 mod common;
 use common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_up};
+use palpated::serve::ServeConfig;
 use tonic::Code;
 
 /// Its samples' rate decides how long a device may be silent; one that goes quiet loses its tool, and the next gets it.
@@ -155,4 +156,33 @@ async fn welcomed(daemon: &Daemon) -> Arm {
         assert!(tokio::time::Instant::now() < until, "the tool is not free");
         tokio::time::sleep(std::time::Duration::from_millis(10)).await;
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_arm_has_force_while_its_button_is_held() {
+    let mut config = ServeConfig::in_process();
+    config.limits.hold_to_run = Some(2);
+    let daemon = Daemon::with(block_scene("held", 3), config).await;
+    let mut arm = daemon.attach(hello()).await;
+    arm.welcome().await;
+    let mut faults = Vec::new();
+    let mut hold = async |buttons: u32, place: DVec3, samples: u32, faults: &mut Vec<v1::DeviceFault>| {
+        let mut force_n = DVec3::ZERO;
+        for _ in 0..samples {
+            arm.sequence += 1;
+            arm.send(v1::DeviceSample { buttons, ..sample(arm.sequence, place) }).await;
+            force_n = force_of(&arm.command(faults).await);
+        }
+        force_n
+    };
+    let others = !(1 << 2);
+    hold(others, above(), 400, &mut faults).await;
+    assert_eq!(hold(others, pressing(), 300, &mut faults).await, DVec3::ZERO, "another button is not this one");
+    let told = |faults: &[v1::DeviceFault]| faults.iter().filter(|f| f.code() == DeviceFaultCode::NotHeld).count();
+    assert_eq!(told(&faults), 1);
+    let held_n = hold(1 << 2, pressing(), 400, &mut faults).await;
+    assert!(held_n.z > 0.1, "{held_n}");
+    assert_eq!(hold(0, pressing(), 40, &mut faults).await, DVec3::ZERO);
+    assert_eq!(told(&faults), 2);
+    daemon.finish().await;
 }

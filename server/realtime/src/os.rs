@@ -186,16 +186,6 @@ fn prefault_stack() {
     std::hint::black_box([0_u8; PREFAULT_BYTES]);
 }
 
-/// Gives memory back to the system that was freed and is kept by the allocator. It holds the allocator's locks meanwhile: for threads
-/// that may wait, when much has been freed.
-pub fn give_back_memory() {
-    // SAFETY: it takes a number of bytes to keep, and touches memory of the allocator only, under its own locks.
-    #[cfg(target_env = "gnu")]
-    unsafe {
-        libc::malloc_trim(0);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

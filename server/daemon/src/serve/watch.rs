@@ -13,15 +13,6 @@ const PERIOD: Duration = Duration::from_millis(100);
 /// Between two lines about late ticks.
 const LATE_PERIOD: Duration = Duration::from_secs(10);
 
-/// How often it is looked how much memory the process has.
-const MEMORY_PERIOD: Duration = Duration::from_secs(5);
-/// Growth that may be of what others took and have given back.
-const WORTH_GIVING_BACK_BYTES: u64 = 32 * 1024 * 1024;
-
-fn resident_bytes() -> u64 {
-    crate::metrics::resident_bytes().unwrap_or(0)
-}
-
 type Device = DeviceServer<crate::grpc::device::DeviceService>;
 
 /// Watches until the daemon stops. A quarantined body gives no force: `Device`, and the daemon as a whole, do not serve then.
@@ -32,7 +23,6 @@ pub(super) async fn watch(daemon: Arc<Daemon>, health: HealthReporter) {
     // A service manager starts the daemon anew when the loop has not woken for so long.
     let watchdog = sd_notify::watchdog_enabled();
     let (mut ticks, mut last_told) = (0, Instant::now());
-    let (mut memory_looked, mut least_bytes) = (Instant::now(), resident_bytes());
     let (mut late, mut late_said) = (0, Instant::now());
     loop {
         tokio::select! {
@@ -43,17 +33,6 @@ pub(super) async fn watch(daemon: Arc<Daemon>, health: HealthReporter) {
         if ticks_now != ticks && watchdog.is_some_and(|every| last_told.elapsed() * 3 >= every) {
             (ticks, last_told) = (ticks_now, Instant::now());
             notify(&[NotifyState::Watchdog]);
-        }
-        if memory_looked.elapsed() >= MEMORY_PERIOD {
-            memory_looked = Instant::now();
-            let bytes = resident_bytes();
-            if bytes > least_bytes + WORTH_GIVING_BACK_BYTES {
-                // What is in use stays: only what grows again is looked for again.
-                let given = tokio::task::spawn_blocking(palpate_realtime::os::give_back_memory);
-                let _ = given.await;
-                least_bytes = resident_bytes();
-            }
-            least_bytes = least_bytes.min(bytes);
         }
         let now = daemon.timing.quarantined_at();
         if now != quarantined {
