@@ -1,7 +1,6 @@
 //! The whole bridge against a daemon's Device service on real sockets.
-mod common;
 
-use common::{Mock, config, pushing, start, until};
+use crate::common::{Mock, config, pushing, start, until};
 use palpate_bridge::BridgeError;
 use palpate_control::{Fault, Link};
 use palpate_proto::v1;

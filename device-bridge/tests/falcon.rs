@@ -1,8 +1,7 @@
 //! The Falcon's driver against its emulator, over real pseudo terminals: beneath a bridge, and alone.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::press::{self, PRESS, elsewhere, lost_in, pressed, pressed_in, simulated};
+use crate::common;
+use crate::common::press::{self, PRESS, elsewhere, lost_in, pressed, pressed_in, simulated};
 use glam::DVec3;
 use palpate_bridge::{
     config::{DeviceConfig, FalconConfig, WorkspaceConfig},

@@ -1,5 +1,4 @@
 //! What the fuzzer asks of every parser (`fuzz/README.md`), of the committed messages and of seeded spoilt ones: here on stable Rust, and each time.
-#![allow(clippy::unwrap_used)]
 #[allow(unreachable_pub)] // for the fuzzer it is a crate
 #[path = "../fuzz/src/lib.rs"]
 mod bodies;

@@ -1,8 +1,7 @@
 //! The 2diy's driver against its emulator, over real pseudo terminals: beneath a bridge, and alone.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::press::{self, PRESS, lost_in, pressed, pressed_in, simulated};
+use crate::common;
+use crate::common::press::{self, PRESS, lost_in, pressed, pressed_in, simulated};
 use glam::{DVec2, DVec3, Vec3Swizzles as _};
 use palpate_bridge::{
     config::{DeviceConfig, Haply2diyConfig, WorkspaceConfig},

@@ -1,5 +1,4 @@
 //! The commands of a plane on a HapticMASTER, against the emulator's plane.
-#![allow(clippy::unwrap_used)]
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     device::{

@@ -1,8 +1,7 @@
 //! A HapticMASTER that renders the contact's plane by itself: driver, servo and emulator together.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::{
+use crate::common;
+use crate::common::{
     Mock,
     press::{self, PRESSED_N, bridged, pressed, pressed_by, simulated, wall},
     start, until,
@@ -208,7 +207,7 @@ async fn damping_is_told_as_a_share_or_as_it_is() {
         let arm = emulator(|settings| settings.effects.damping_is_ratio = ratio);
         let keys = HapticMasterConfig { damping_is_ratio: ratio, ..keys(&arm, HapticMasterContact::Plane) };
         let damped = |config: &mut Config| config.render.damping_n_s_per_m = 5.0;
-        let found_n = pressed_by(FLICKER_N, DeviceConfig::Hapticmaster(keys), damped).await.force_n;
+        let found_n = pressed_by(FLICKER_N, Duration::ZERO, DeviceConfig::Hapticmaster(keys), damped).await.force_n;
         assert!((found_n / PRESSED_N - 1.0).abs() < 0.05, "{found_n} N");
     }
 }

@@ -1,8 +1,7 @@
 //! The Inverse3's driver against its emulator, over real WebSockets: beneath a bridge, and alone.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::press::{self, PRESSED_N, lost_by, pressed, simulated};
+use crate::common;
+use crate::common::press::{self, PRESSED_N, lost_by, pressed, simulated};
 use glam::{DQuat, DVec3};
 use palpate_bridge::{
     config::{DeviceConfig, Inverse3Config, Inverse3Dialect, RealtimeConfig},

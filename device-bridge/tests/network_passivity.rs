@@ -1,5 +1,4 @@
 //! Does the hand ever get energy out of a wall behind a bad network? Arm, hand, servo law, network and daemon in simulated time; the energy is counted at the arm, not by the controller.
-#![allow(clippy::unwrap_used)] // helpers of tests
 use glam::{DMat3, DVec3};
 use palpate_bridge::{Config, convert::Command, servo::ServoLaw, settings::Settings};
 use palpate_control::{ArmSpec, ForceLimits, HandPath, Keyframe, LocalModel, SimulatedArm};

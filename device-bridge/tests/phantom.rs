@@ -1,12 +1,9 @@
 //! The driver of a PHANToM against a library in libHD's place and its emulated arm: beneath a bridge, and alone.
-#![allow(clippy::unwrap_used)]
-mod common;
-#[path = "common/libhd.rs"]
-mod libhd;
 
-use common::press::{self, PRESSED_N, lost_by, pressed, simulated};
+use crate::common;
+use crate::common::press::{self, PRESSED_N, lost_by, pressed, simulated};
+use crate::libhd::Emulated;
 use glam::{DQuat, DVec3};
-use libhd::Emulated;
 use palpate_bridge::{
     Config, Handle,
     config::{DeviceConfig, PhantomConfig},

@@ -1,8 +1,7 @@
 //! What an arm did is recorded beneath a bridge, and played back as an arm beneath another.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::press::{PRESSED_N, Pressed, pressed_by, simulated};
+use crate::common;
+use crate::common::press::{PRESSED_N, Pressed, pressed_by, simulated};
 use glam::DVec3;
 use palpate_bridge::{
     BridgeError, Config,
@@ -44,10 +43,11 @@ async fn a_recorded_press_is_played_back_with_the_same_motion_and_force() {
     let folder = tempfile::tempdir().unwrap();
     let [first, second] = ["first.csv", "second.csv"].map(|name| folder.path().join(name));
     let Pressed { force_n: pressed_n, summary, .. } =
-        pressed_by(2e-4, simulated(), |config| config.record = record(&first)).await;
+        pressed_by(2e-4, Duration::ZERO, simulated(), |config| config.record = record(&first)).await;
     assert!((pressed_n / PRESSED_N - 1.0).abs() < 0.02, "{pressed_n}");
     assert_eq!(rows(&first).len() as u64, summary.ticks, "a row a tick");
-    let played_n = pressed_by(2e-3, playback(&first), |config| config.record = record(&second)).await.force_n;
+    let lasts = Duration::from_secs_f64(rows(&first).last().unwrap().0);
+    let played_n = pressed_by(2e-3, lasts, playback(&first), |config| config.record = record(&second)).await.force_n;
     // It ends, and stays, where the first bridge's hand came to when its force had gone; the wall has 400 N/m.
     let end_m = WALL_M - rows(&second).last().unwrap().1;
     assert!((played_n / (400.0 * end_m) - 1.0).abs() < 0.02, "{played_n} N at {end_m} m");

@@ -1,9 +1,6 @@
 //! The law of the servo, tick by tick, without threads or real time.
-#![allow(clippy::unwrap_used)] // helpers of tests
-#[path = "common/law.rs"]
-mod bench;
 
-use bench::{MS, command, law, still};
+use crate::bench::{MS, command, law, still};
 use glam::{DMat3, DVec3};
 use palpate_bridge::{convert::Command, servo::ServoLaw};
 use palpate_control::{ArmSpec, Fault, HandPath, Link, LocalModel, Motion, SimulatedArm};

@@ -1,5 +1,4 @@
 //! The plane that the servo's law gives an arm which renders it by itself, tick by tick, without threads or real time.
-#![allow(clippy::unwrap_used)] // helpers of tests
 use glam::{DMat3, DVec3};
 use palpate_bridge::{
     Config,

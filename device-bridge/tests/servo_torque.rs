@@ -1,9 +1,6 @@
 //! The torque of the servo's law, tick by tick.
-#![allow(clippy::unwrap_used)] // helpers of tests
-#[path = "common/law.rs"]
-mod bench;
 
-use bench::{MS, command, law, still};
+use crate::bench::{MS, command, law, still};
 use glam::{DMat3, DQuat, DVec3};
 use palpate_bridge::convert::Command;
 use palpate_control::{LocalTorque, Motion, TorqueLimits};

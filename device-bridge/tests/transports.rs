@@ -1,7 +1,6 @@
 //! The same bridge over a Unix socket and over TLS.
-mod common;
 
-use common::{Mock, config, start, until};
+use crate::common::{Mock, config, start, until};
 use palpate_proto::v1::device_server::DeviceServer;
 use tokio_stream::wrappers::UnixListenerStream;
 use tonic::transport::{Identity, Server, ServerTlsConfig, server::TcpIncoming};

@@ -1,8 +1,7 @@
 //! The VRPN driver against its emulator, over real sockets: beneath a bridge, and alone.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::press::{self, PRESSED_N, bridged, lost_by, pressed, simulated, to_arm};
+use crate::common;
+use crate::common::press::{self, PRESSED_N, bridged, lost_by, pressed, simulated, to_arm};
 use glam::{DQuat, DVec3};
 use palpate_bridge::{
     config::{DeviceConfig, LimitsConfig, VrpnConfig},

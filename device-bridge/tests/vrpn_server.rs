@@ -1,8 +1,6 @@
 //! The bridge's VRPN server, over real sockets: what programs read, how they come, and that none of them holds the loop.
-#![allow(clippy::unwrap_used)]
-mod common;
 
-use common::{
+use crate::common::{
     Mock, Running,
     press::{self, bridged, simulated, to_arm},
     start, until,

@@ -93,16 +93,22 @@ impl Pressed {
 
 /// Presses until the force no longer moves by more than `flicker_n` (N) within half a second.
 pub async fn pressed(flicker_n: f64, device: DeviceConfig) -> Pressed {
-    pressed_by(flicker_n, device, |_| {}).await
+    pressed_by(flicker_n, Duration::ZERO, device, |_| {}).await
 }
 
 /// The same for an arm that is somewhere else.
 pub async fn pressed_in(flicker_n: f64, workspace: WorkspaceConfig, device: DeviceConfig) -> Pressed {
-    pressed_by(flicker_n, device, |config| config.workspace = workspace).await
+    pressed_by(flicker_n, Duration::ZERO, device, |config| config.workspace = workspace).await
 }
 
-/// The same, by a bridge whose configuration is changed before.
-pub async fn pressed_by(flicker_n: f64, device: DeviceConfig, change: impl FnOnce(&mut Config)) -> Pressed {
+/// The same, by a bridge whose configuration is changed before, and of an arm that is known to move for so long after it touches:
+/// a rest on its way is not its end.
+pub async fn pressed_by(
+    flicker_n: f64,
+    moves_for: Duration,
+    device: DeviceConfig,
+    change: impl FnOnce(&mut Config),
+) -> Pressed {
     let sleeper = Sleeper::start();
     let mock = Mock::default();
     mock.set(|behaviour| behaviour.local_model = Some(wall()));
@@ -113,6 +119,7 @@ pub async fn pressed_by(flicker_n: f64, device: DeviceConfig, change: impl FnOnc
     let bridge = start(config);
     let stats = bridge.handle.stats();
     until("it presses", || stats.force_n() > 0.5).await;
+    tokio::time::sleep(moves_for).await;
     let mut last = std::collections::VecDeque::new();
     until("it has come to rest", || {
         last.push_back(stats.force_n());

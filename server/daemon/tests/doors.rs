@@ -1,7 +1,6 @@
 //! The ways in: TCP, TLS, Unix sockets, health, reflection, the page, gRPC-web; and ports that cannot be had.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, block_scene};
+use crate::common;
+use crate::common::{Daemon, block_scene};
 use palpate_proto::v1::{self, session_client::SessionClient};
 use palpated::{
     doors::listen::ListenError,

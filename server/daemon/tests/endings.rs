@@ -1,7 +1,6 @@
 //! How an arm's force ends: by an order, with the daemon, or when its loop fails.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
+use crate::common;
+use crate::common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_up};
 use palpated::serve::ServeConfig;

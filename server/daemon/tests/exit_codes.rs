@@ -1,6 +1,5 @@
 //! What `simulate` and `static` end with when there is a result that is not to be trusted: elements that were turned
 //! inside out, and equilibria that are none, ended with 0 and without a word.
-#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 

@@ -1,5 +1,4 @@
 //! `palpated fit-budget` on a small block: what it chooses, what it writes, and what it refuses.
-#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use std::{
     fs,
     path::{Path, PathBuf},

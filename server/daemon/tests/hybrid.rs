@@ -1,7 +1,5 @@
 //! A hybrid body in the daemon: over real sockets, and with the bits of `palpated simulate`.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{
+use crate::common::{
     Daemon,
     hybrid::{HYBRID, hybrid_scene},
     seen::{Seen, simulated},

@@ -1,7 +1,6 @@
 //! Who may do what, by certificate and by token, over real sockets.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Arm, PATIENCE, above, block_scene, force_of, hello, pressing, sample};
+use crate::common;
+use crate::common::{Arm, PATIENCE, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
 use palpate_proto::{
     connect::{Connection, Credentials, endpoint},

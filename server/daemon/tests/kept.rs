@@ -1,7 +1,5 @@
 //! The session survives the process: kept while it runs, when it stops and before another scene is loaded, and taken up again bit for bit.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, PATIENCE, block_scene, pressed_scene};
+use crate::common::{Daemon, PATIENCE, block_scene, pressed_scene};
 use palpate_proto::v1::{self, load_scene_request::Source as WireSource};
 use palpated::{
     kept::{

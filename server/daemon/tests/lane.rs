@@ -1,7 +1,6 @@
 //! The arms' lane: connections that begin with an arm's sign are served whatever everybody else is waiting for.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Arm, Daemon, PATIENCE, above, block_scene, hello};
+use crate::common;
+use crate::common::{Arm, Daemon, PATIENCE, above, block_scene, hello};
 use palpate_proto::{
     ARM_SIGN,
     connect::{Credentials, connect_arm, endpoint},

@@ -1,7 +1,6 @@
 //! What an arm has to do to keep its tool and its force: how long it may be silent, how it loses its tool, and a button that is to be held.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
+use crate::common;
+use crate::common::{Arm, Daemon, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
 use palpate_proto::v1::{self, DeviceFaultCode, device_down::Message, device_up};
 use palpated::serve::ServeConfig;

@@ -1,5 +1,4 @@
 //! What `palpated` says of limits before a hand feels them, and where a run has passed them.
-#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use serde_json::Value;
 use std::{fs, process::Command};
 

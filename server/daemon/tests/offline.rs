@@ -1,5 +1,4 @@
 //! The offline commands as a user runs them: the real program, real folders.
-#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use serde_json::Value;
 use std::{
     fs,

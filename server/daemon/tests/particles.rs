@@ -1,7 +1,5 @@
 //! The layer of active particles over real sockets.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{
+use crate::common::{
     Daemon, PATIENCE, dvec3,
     hybrid::{hybrid_scene, seed_scene},
     pressed_scene,

@@ -1,7 +1,6 @@
 //! Whatever is ordered, the force on an arm neither jumps nor takes longer to vanish than it may. A clock by hand.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{above, block_scene, pressing};
+use crate::common;
+use crate::common::{above, block_scene, pressing};
 use glam::DVec3;
 use palpate_control::{HandPath, Keyframe, LocalModel, RenderSettings};
 use palpate_physics::Model;

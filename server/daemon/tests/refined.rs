@@ -1,7 +1,6 @@
 //! The layer of the surface refined near tools over real sockets.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, PATIENCE, hybrid::hybrid_scene, pressed_scene, springs::springs_scene};
+use crate::common;
+use crate::common::{Daemon, PATIENCE, hybrid::hybrid_scene, pressed_scene, springs::springs_scene};
 use palpate_physics::{bodies::mass_spring::loop_scheme::refined, mesh::Triangulation, snapshot};
 use palpate_proto::v1::{self, surface_event::Message};
 use palpate_scene::Scene;

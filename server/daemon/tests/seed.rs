@@ -1,7 +1,5 @@
 //! The papers' hybrid in the daemon, as its shipped scene: over real sockets, and with the bits of `palpated simulate`.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{
+use crate::common::{
     Daemon,
     hybrid::{SEED, seed_scene},
     seen::{Seen, simulated},

@@ -1,7 +1,6 @@
 //! Control over a real socket: scenes, time, state, injected forces, and what is refused.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, block_scene, pressed_scene, vec3};
+use crate::common;
+use crate::common::{Daemon, block_scene, pressed_scene, vec3};
 use glam::DVec3;
 use palpate_proto::v1::{self, load_scene_request::Source};
 use tonic::Code;

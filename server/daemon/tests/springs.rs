@@ -1,7 +1,5 @@
 //! A mass-spring surface in the daemon: over real sockets, and with the bits of `palpated simulate`.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{
+use crate::common::{
     Daemon,
     seen::{Seen, simulated},
     springs::{SPRINGS, springs_scene},

@@ -1,5 +1,4 @@
 //! `palpated static` of bodies with particles.
-#![allow(clippy::unwrap_used)] // helpers outside #[test] functions
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 

@@ -1,7 +1,5 @@
 //! What a daemon's status tells of its body: what particles are awake for, and what is wrong with it as it is.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, hybrid::hybrid_scene, vec3};
+use crate::common::{Daemon, hybrid::hybrid_scene, vec3};
 use glam::DVec3;
 use palpate_proto::v1;
 use palpate_scene::{Limits, parse};

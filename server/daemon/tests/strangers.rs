@@ -1,8 +1,6 @@
 //! Strangers at the doors: who announces and does not send, who connects and does not ask, who asks and does not read. All is
 //! bounded, counted, and nobody is kept out by them.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, PATIENCE, above, block_scene, hello, kneaded_scene};
+use crate::common::{Daemon, PATIENCE, above, block_scene, hello, kneaded_scene};
 use futures_util::{StreamExt as _, stream};
 use http_body_util::{BodyExt as _, StreamBody};
 use palpate_proto::v1;

@@ -1,7 +1,5 @@
 //! Viewers over a real socket.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, Mirror, PATIENCE, block_scene, kneaded_scene, pressed_scene};
+use crate::common::{Daemon, Mirror, PATIENCE, block_scene, kneaded_scene, pressed_scene};
 use palpate_proto::v1::{self, LevelOfDetail, surface_client::SurfaceClient};
 use std::time::Duration;
 use tokio::time::timeout;

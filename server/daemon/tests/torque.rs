@@ -1,7 +1,5 @@
 //! The torque of a tool that turns, over a real socket.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-mod common;
-use common::{Daemon, SIZE_M, above, block_scene, force_of, hello, pressing, sample};
+use crate::common::{Daemon, SIZE_M, above, block_scene, force_of, hello, pressing, sample};
 use glam::DVec3;
 use palpate_physics::contact::ToolShape;
 use palpate_proto::v1;

@@ -130,8 +130,13 @@ fn a_latched_fault_outlives_the_bridge() {
     let place = tempfile::tempdir().unwrap();
     let file = place.path().join("latched");
     let latch = file.to_str().unwrap();
+    // A machine that lets the loop wait while other tests run latches no fault of its own.
+    let patient = place.path().join("patient.toml");
+    fs::write(&patient, "[servo]\nleast_success_rate = 0.0\nguard = false\n[watchdog]\nstale_after_s = 20.0\n")
+        .unwrap();
     let daemon = Daemon::start(&["ventricle"]);
-    let arguments = ["--server", &daemon.url, "--device", "simulated", "--latch-file", latch];
+    let config = patient.to_str().unwrap();
+    let arguments = ["--config", config, "--server", &daemon.url, "--device", "simulated", "--latch-file", latch];
     let state = |status: &serde_json::Value| status["devices"][0]["safety_state"].as_str().unwrap_or("").to_owned();
     fs::write(&file, "device\n").unwrap();
     for killed in [true, false] {
