@@ -4,13 +4,13 @@ use crate::{
     guard::Guard,
     latch::Latch,
     recording::recorder::Failure,
-    servo::{Servo, ServoLaw},
+    servo::{Servo, ServoLaw, Waits},
     settings::{ServoSettings, Settings},
     uplink::{SampleSource, Uplink},
     vrpn_server,
     watcher::{WATCH_PERIOD, Watcher},
 };
-use palpate_control::{EnergyMeter, Link, StiffnessBound};
+use palpate_control::{EnergyMeter, Link, PhaseLock, StiffnessBound};
 use palpate_realtime::{Clock, Doorbell, Note, OsMeasures, TickLoop, slot};
 use std::{
     path::PathBuf,
@@ -54,6 +54,8 @@ pub struct Shared {
     pub lost: AtomicBool,
     /// There was a guard, and it is gone.
     pub unguarded: AtomicBool,
+    /// How long poses wait for the daemon's ticks.
+    pub waits: Waits,
     /// The daemon's force crosses the network, and nobody knows yet whether that is stable.
     pub unmeasured: AtomicBool,
 }
@@ -146,6 +148,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
         sequence: 0,
         energy: EnergyMeter::default(),
         guard,
+        phase: settings.follow_phase.then(|| PhaseLock::new((settings.servo.period_s * 1e9).round() as u64)),
     };
     shared.unmeasured.store(settings.uplink.across_network.is_some(), Ordering::Relaxed);
     let _no_servo_alone = StopOnDrop(Arc::clone(&shared));

@@ -35,7 +35,7 @@ use palpate_bridge::{
     settings::{Settings, arm},
     vrpn_server::moment::moments,
 };
-use palpate_control::{ArmSpec, ContactPlane, ForceLimits, HandPath, LocalModel, TorqueLimits};
+use palpate_control::{ArmSpec, ContactPlane, ForceLimits, HandPath, LocalModel, PhaseLock, TorqueLimits, Wait};
 use palpate_realtime::{Clock, Doorbell, OsMeasures, TickLoop, slot};
 use std::{
     sync::{Arc, atomic::Ordering},
@@ -75,6 +75,7 @@ fn the_servo_allocates_nothing() {
         sequence: 0,
         energy: palpate_control::EnergyMeter::default(),
         guard: Some(guard),
+        phase: Some(PhaseLock::new(1_000_000)),
     };
     let mut tick_loop = TickLoop::new(Clock::Monotonic, 1e-3).unwrap();
     let thread = std::thread::spawn(move || {
@@ -91,6 +92,7 @@ fn the_servo_allocates_nothing() {
     };
     for tick in 0..500 {
         std::thread::sleep(Duration::from_millis(1));
+        shared.waits.tell(&Wait { waited_ns: 500_000, answered_after_ns: 900_000, tick_period_ns: 1_000_000 });
         commands.publish(Some(Command {
             answers_ns: Clock::Monotonic.now_ns(),
             tick,

@@ -110,6 +110,8 @@ pub struct ServoConfig {
     pub latch_file: Option<PathBuf>,
     /// Share of ticks, over the last thousand, in which the newest answer must have been in time; with fewer the force is taken away. 0: any.
     pub least_success_rate: f64,
+    /// Move the loop's ticks to where a pose reaches the daemon right before it is used; false: they stay where the start put them.
+    pub follow_phase: bool,
     /// A second process takes the force away when this one is killed or hangs; for arms whose connection outlives it.
     pub guard: bool,
     /// Pause (s) between lines of counters; 0: only at exit.
@@ -123,6 +125,7 @@ impl Default for ServoConfig {
             auto_recover: false,
             latch_file: None,
             least_success_rate: 0.9,
+            follow_phase: true,
             guard: true,
             report_every_s: 10.0,
         }

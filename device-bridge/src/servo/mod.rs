@@ -1,5 +1,6 @@
 //! The loop beside the arm: from the newest command and the arm's motion to a safe force.
 mod law;
+mod waits;
 
 use crate::{
     convert::{Command, Sample},
@@ -10,12 +11,13 @@ use crate::{
 };
 use glam::DVec3;
 pub use law::{ServoLaw, ServoTick};
-use palpate_control::{EnergyMeter, Fault, Link, Motion};
+use palpate_control::{EnergyMeter, Fault, Link, Motion, PhaseLock};
 use palpate_realtime::{Doorbell, SlotReader, SlotWriter, TickLoop, Wakeup};
 use std::{
     ops::ControlFlow,
     sync::{Arc, atomic::Ordering},
 };
+pub use waits::Waits;
 
 /// The servo's ends of everything.
 #[derive(Debug)]
@@ -42,6 +44,8 @@ pub struct Servo {
     pub energy: EnergyMeter,
     /// Who takes the force away should this process be killed.
     pub guard: Option<Guard>,
+    /// When to run beside the daemon's loop; `None`: whenever it was started.
+    pub phase: Option<PhaseLock>,
 }
 
 impl Servo {
@@ -49,10 +53,10 @@ impl Servo {
     /// without force.
     pub fn run(&mut self, tick_loop: &mut TickLoop) {
         let clock = tick_loop.clock().clone();
-        tick_loop.run(|wakeup| self.tick(wakeup, clock.now_ns()));
+        tick_loop.run_shifted(|wakeup| self.tick(wakeup, clock.now_ns()));
     }
 
-    fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<()> {
+    fn tick(&mut self, wakeup: &Wakeup, now_ns: u64) -> ControlFlow<(), i64> {
         self.obey_guard();
         let mut read = self.device.read(1 + wakeup.skipped);
         if self.obey_guard() && !self.has_failed() {
@@ -93,8 +97,14 @@ impl Servo {
             Link::Latched(Fault::Requested) => ControlFlow::Break(()),
             // Whatever took the force away: a lost arm has to be opened anew.
             Link::Latched(_) if read.is_err() || self.shared.stop.load(Ordering::Relaxed) => ControlFlow::Break(()),
-            _ => ControlFlow::Continue(()),
+            _ => ControlFlow::Continue(self.later_ns()),
         }
+    }
+
+    /// By how much (ns) the ticks to come are to be later, so that poses reach the daemon right before it uses them.
+    fn later_ns(&mut self) -> i64 {
+        let heard = self.shared.waits.take();
+        self.phase.as_mut().zip(heard).map_or(0, |(phase, wait)| phase.heard(&wait))
     }
 
     /// The guard may have spoken at any moment that this thread stood still in: the force is gone. Whether it has since this was asked last.
@@ -190,6 +200,7 @@ impl Drop for Servo {
 mod tests {
     use super::*;
     use crate::{Config, device::Witness, settings::Settings};
+    use palpate_control::Wait;
     use palpate_realtime::{Clock, slot};
     use std::io::Write as _;
 
@@ -225,8 +236,25 @@ mod tests {
             sequence: 0,
             energy: EnergyMeter::default(),
             guard: None,
+            phase: None,
         };
         (servo, witness, commands)
+    }
+
+    /// Once for each pose that it hears of; and not at all where it was told to stay.
+    #[tokio::test]
+    async fn ticks_are_later_where_poses_wait_and_earlier_where_they_miss() {
+        let (mut servo, _witness, _commands) = pressed(u64::MAX);
+        let wakeup = Wakeup { tick: 0, deadline_ns: 0, woke_ns: 0, skipped: 0, overrun: false };
+        let after = |servo: &mut Servo, waited_ns| {
+            servo.shared.waits.tell(&Wait { waited_ns, answered_after_ns: 300_000, tick_period_ns: 1_000_000 });
+            servo.tick(&wakeup, Clock::Monotonic.now_ns()).continue_value()
+        };
+        assert_eq!(after(&mut servo, 400_000), Some(0), "it follows nothing");
+        servo.phase = Some(PhaseLock::new(1_000_000));
+        assert_eq!(after(&mut servo, 400_000), Some(2_000));
+        assert_eq!(servo.tick(&wakeup, Clock::Monotonic.now_ns()).continue_value(), Some(0));
+        assert_eq!(after(&mut servo, 900_000), Some(-2_000));
     }
 
     #[tokio::test]

@@ -35,6 +35,8 @@ pub struct Settings {
     pub measures: OsMeasures,
     /// A second process takes the force away when this one is killed.
     pub guard: bool,
+    /// The loop moves its ticks to where their poses are used soon after they reach the daemon.
+    pub follow_phase: bool,
     /// Where a latched fault is remembered.
     pub latch_file: Option<PathBuf>,
     /// Pause between lines of counters.
@@ -110,6 +112,7 @@ impl Settings {
             servo,
             measures: measures(config)?,
             guard: config.servo.guard,
+            follow_phase: config.servo.follow_phase,
             latch_file: config.servo.latch_file.clone(),
             report_every: (!report_every.is_zero()).then_some(report_every),
         })

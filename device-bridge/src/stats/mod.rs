@@ -73,6 +73,8 @@ pub struct Stats {
     pub vrpn_server: VrpnStats,
     /// From reading the arm to receiving the first command that used it (ns).
     pub round_trip: Histogram,
+    /// For how long the poses of those commands had waited for the daemon's tick (ns), where it says so.
+    pub waited: Histogram,
     /// Ticks since the first command.
     pub judged: Counter,
     /// Those of them in which the newest answer was in time.
@@ -214,6 +216,7 @@ impl Stats {
             final_force_n: self.force_n(),
             link: self.link(),
             round_trip: self.round_trip.percentiles(),
+            waited: self.waited.percentiles(),
             judged: self.judged.get(),
             in_time: self.in_time.get(),
             ticks: servo.map_or(0, LoopMonitor::ticks),

@@ -23,6 +23,7 @@ pub struct Summary {
     pub final_force_n: f64,
     pub link: Link,
     pub round_trip: Percentiles,
+    pub waited: Percentiles,
     pub judged: u64,
     pub in_time: u64,
     pub ticks: u64,
@@ -92,6 +93,9 @@ impl fmt::Display for Summary {
         } else {
             let (p50, p99, max) = (us(trip.p50_ns), us(trip.p99_ns), us(trip.max_ns));
             write!(f, "trip     pose to force p50 {p50:.0} us, p99 {p99:.0} us, max {max:.0} us")?;
+            if self.waited.count > 0 {
+                write!(f, ", of which {:.0} us (p50) the pose waited for its tick", us(self.waited.p50_ns))?;
+            }
             let share = self.share_in_time().unwrap_or(0.0);
             writeln!(f, "; an answer in time in {:.2} % of ticks", 1e2 * share)?;
         }

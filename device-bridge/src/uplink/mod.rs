@@ -9,6 +9,7 @@ use crate::{
     run::Shared,
     settings::UplinkSettings,
 };
+use palpate_control::Wait;
 use palpate_proto::{
     connect::{connect_arm, is_nobody_there, is_transport, why_no_answer, why_unreachable, words_of},
     v1::{self, device_client::DeviceClient, device_down::Message},
@@ -253,6 +254,7 @@ impl Uplink {
                         told.newest_sequence = wire.sample_sequence;
                         let trip_ns = now_ns.saturating_sub(wire.echo_device_time_ns);
                         self.shared.stats.round_trip.record(trip_ns);
+                        self.hear_of_phase(&wire, trip_ns, welcome);
                         told.trips.record(trip_ns);
                         self.judge_stiffness(welcome, told);
                     }
@@ -271,6 +273,14 @@ impl Uplink {
                 told.once(text, text);
             }
         }
+    }
+
+    /// For how long a pose had waited for its tick.
+    fn hear_of_phase(&self, wire: &v1::DeviceCommand, answered_after_ns: u64, welcome: &Welcome) {
+        let Some(waited_ns) = wire.sample_waited_ns else { return };
+        self.shared.stats.waited.record(waited_ns);
+        let tick_period_ns = (welcome.tick_period_s * 1e9).round() as u64;
+        self.shared.waits.tell(&Wait { waited_ns, answered_after_ns, tick_period_ns });
     }
 
     /// Without a local model the stiff loop crosses the network: no force before it is known to be stable there.

@@ -122,6 +122,7 @@ impl Mock {
             local_model: behaviour.local_model.clone(),
             proxy_position_m: Some(v1::Vec3::default()),
             proxy_orientation: None,
+            sample_waited_ns: None,
         };
         answers.push(DeviceDown { message: Some(Message::Command(command)) });
         Some(answers)

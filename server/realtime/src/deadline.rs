@@ -80,6 +80,12 @@ impl Deadlines {
         &self.clock
     }
 
+    /// Moves the grid: the next deadline, and all after it, are later by `by_ns` (below zero: earlier), half a period at most.
+    pub fn shift(&mut self, by_ns: i64) {
+        let most_ns = (self.period_ns / 2) as i64;
+        self.next_ns = self.next_ns.saturating_add_signed(by_ns.clamp(-most_ns, most_ns));
+    }
+
     /// Sleeps until the next deadline, and for [`REST`] of the period at least.
     pub fn wait(&mut self) -> Wakeup {
         let now_ns = self.clock.now_ns();
@@ -112,6 +118,21 @@ mod tests {
             assert_eq!((wakeup.tick, wakeup.deadline_ns, wakeup.lateness_ns()), (n, (n + 1) * MS, 30_000));
             assert!(!wakeup.overrun);
             time.advance(600_000);
+        }
+    }
+
+    #[test]
+    fn a_shift_moves_every_deadline_after_it() {
+        let (clock, _time) = Clock::manual();
+        let mut deadlines = Deadlines::new(clock, 1e-3).unwrap();
+        deadlines.wait();
+        for (by_ns, moved_ns) in [(2_000, 2_000), (-5_000, -3_000), (i64::MAX, 497_000), (i64::MIN, -3_000)] {
+            deadlines.shift(by_ns);
+            for _ in 0..2 {
+                let wakeup = deadlines.wait();
+                let due_ns = ((wakeup.tick + 1) * MS).saturating_add_signed(moved_ns);
+                assert_eq!((wakeup.deadline_ns, wakeup.skipped), (due_ns, 0));
+            }
         }
     }
 

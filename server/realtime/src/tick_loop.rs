@@ -92,14 +92,24 @@ impl TickLoop {
     /// Runs `tick` at every deadline on this thread until it breaks. An overrun is counted when the next deadline is waited for,
     /// so the work that ends the loop is never counted as one.
     pub fn run(&mut self, mut tick: impl FnMut(&Wakeup) -> ControlFlow<()>) {
+        self.run_shifted(|wakeup| match tick(wakeup) {
+            ControlFlow::Continue(()) => ControlFlow::Continue(0),
+            ControlFlow::Break(()) => ControlFlow::Break(()),
+        });
+    }
+
+    /// As [`TickLoop::run`], on a grid that each tick may move: by how much (ns) all ticks after it are later, or earlier.
+    pub fn run_shifted(&mut self, mut tick: impl FnMut(&Wakeup) -> ControlFlow<(), i64>) {
         self.deadlines.restart();
         loop {
             let wakeup = self.deadlines.wait();
             self.monitor.woke(&wakeup);
             let flow = tick(&wakeup);
             self.monitor.tick_cost.record(self.deadlines.clock().now_ns().saturating_sub(wakeup.woke_ns));
-            if flow.is_break() {
-                return;
+            match flow {
+                ControlFlow::Continue(0) => {}
+                ControlFlow::Continue(by_ns) => self.deadlines.shift(by_ns),
+                ControlFlow::Break(()) => return,
             }
         }
     }

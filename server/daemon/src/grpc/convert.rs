@@ -301,6 +301,7 @@ pub fn device_command(output: &ToolOutput) -> v1::DeviceCommand {
         local_model: output.local_model.as_ref().map(|model| local_model(model, output)),
         proxy_position_m: Some(wire_vec3(output.proxy_position_m)),
         proxy_orientation: Some(wire_quaternion(output.proxy_orientation)),
+        sample_waited_ns: output.sample_waited_ns,
     }
 }
 

@@ -52,6 +52,8 @@ pub struct ToolOutput {
     pub sample_sequence: u64,
     /// Its device time (ns).
     pub echo_device_time_ns: u64,
+    /// For how long (ns) it had waited for this tick, the first that used it.
+    pub sample_waited_ns: Option<u64>,
     /// Contact around the device, its force and stiffness scaled as the wrench is; `None` out of contact or when the force is zero
     /// by order.
     pub local_model: Option<LocalContactModel>,

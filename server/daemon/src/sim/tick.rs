@@ -27,7 +27,7 @@ impl Simulation {
     pub fn tick(&mut self, plan: Plan, clock: &Clock, timing: &Timing) {
         let begun_ns = clock.now_ns();
         for tool in &mut self.tools {
-            tool.listen();
+            tool.listen(begun_ns);
         }
         if plan.advance {
             self.read_inputs(begun_ns);

@@ -67,6 +67,8 @@ pub struct ToolLoop {
     /// The simulated arm has to start where the device left the tool.
     arm_takes_over: bool,
     newest: Option<DeviceInput>,
+    /// For how long (ns) the newest sample had waited, if this tick is the first that uses it.
+    waited_ns: Option<u64>,
     limited: LimitedTicks,
     raw_n: DVec3,
     raw_nm: DVec3,
@@ -90,6 +92,7 @@ impl ToolLoop {
             place: Place::Clear,
             arm_takes_over: false,
             newest: None,
+            waited_ns: None,
             limited: LimitedTicks::default(),
             raw_n: DVec3::ZERO,
             raw_nm: DVec3::ZERO,
@@ -107,8 +110,9 @@ impl ToolLoop {
         (self.output.force_n, self.output.torque_nm) == (DVec3::ZERO, DVec3::ZERO)
     }
 
-    /// Takes note of attaching, detaching and new samples. Once per loop, also while paused.
-    pub fn listen(&mut self) {
+    /// Takes note of attaching, detaching and new samples at the beginning (ns) of each tick, also while paused.
+    pub fn listen(&mut self, begun_ns: u64) {
+        self.waited_ns = None;
         let attachment = self.port.shared.attachment();
         if attachment != self.attachment {
             self.change_hands(attachment);
@@ -122,6 +126,7 @@ impl ToolLoop {
             self.watchdog.recover();
             self.watchdog.sample_arrived(sample.arrived_ns);
             self.newest = Some(sample);
+            self.waited_ns = Some(begun_ns.saturating_sub(sample.arrived_ns));
         }
     }
 
@@ -252,6 +257,7 @@ impl ToolLoop {
             torque_nm,
             sample_sequence: self.newest.map_or(0, |s| s.sequence),
             echo_device_time_ns: self.newest.map_or(0, |s| s.device_time_ns),
+            sample_waited_ns: self.waited_ns,
             local_model: rendered.map(|model| {
                 let cut = left_of(self.raw_n.length(), limited.force_n.length() / ramp);
                 let to_peak = left_of(model.force_n.length() * cut * ramp, model_max_force_n);
