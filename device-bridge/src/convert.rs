@@ -291,6 +291,7 @@ mod tests {
             }),
             proxy_position_m: vec(0.1, 0.0, 0.0),
             proxy_orientation: None,
+            sample_waited_ns: Some(300_000),
         }
     }
 

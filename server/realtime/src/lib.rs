@@ -18,6 +18,6 @@ pub use clock::{Clock, ManualClock};
 pub use deadline::{Deadlines, PeriodError, Wakeup};
 pub use doorbell::Doorbell;
 pub use histogram::{Histogram, Percentiles};
-pub use os::{Note, OsMeasures};
+pub use os::{Note, OsMeasures, give_large_blocks_back};
 pub use slot::{SlotReader, SlotWriter, slot};
 pub use tick_loop::{LoopMonitor, TickLoop};

@@ -59,6 +59,22 @@ pub struct Granted {
     _awake: Option<File>,
 }
 
+/// Blocks from this size on (bytes) are the system's own again as soon as they are freed.
+#[cfg(target_env = "gnu")]
+const OWN_PAGES_BYTES: libc::c_int = 128 * 1024;
+
+/// Has the allocator give large blocks back to the system when they are freed, for the whole process.
+///
+/// glibc does so by itself until the first of them is freed; from then on blocks of its size come from its heaps, which, in locked memory,
+/// never shrink (`MADV_DONTNEED` is refused there). A crowd's messages stayed for ever.
+pub fn give_large_blocks_back() {
+    // SAFETY: mallopt takes two numbers, and may be called at any time by any thread.
+    #[cfg(target_env = "gnu")]
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, OWN_PAGES_BYTES);
+    }
+}
+
 /// How far the priority of a stream's thread is below its loop's.
 const BELOW_THE_LOOP: u8 = 10;
 /// Stack that is touched beforehand: more than a tick uses.
@@ -249,5 +265,32 @@ mod tests {
         assert!(fifo(100).text.contains("1 to 99"));
         assert!(!pin_to(100_000).granted);
         assert!(!pin_to(1000).granted);
+    }
+
+    fn resident_mib() -> f64 {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+        line.split_whitespace().next().unwrap().parse::<f64>().unwrap() / 1024.0
+    }
+
+    /// Freed in any order, and with small ones between them.
+    #[test]
+    #[cfg(target_env = "gnu")]
+    fn large_blocks_go_back_to_the_system() {
+        give_large_blocks_back();
+        drop(vec![1_u8; 4 << 20]);
+        let before = resident_mib();
+        let mut kept = Vec::new();
+        let blocks: Vec<_> = (0..100)
+            .map(|_| {
+                kept.push(vec![1_u8; 64]);
+                vec![1_u8; 1 << 20]
+            })
+            .collect();
+        let most = resident_mib();
+        drop(blocks);
+        let after = resident_mib();
+        assert!(most - before > 95.0 && after - before < 10.0, "{before}, {most}, {after} MiB");
+        drop(kept);
     }
 }

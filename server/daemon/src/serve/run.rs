@@ -10,6 +10,7 @@ use crate::{
     who::keeper::Keeper,
 };
 use miette::IntoDiagnostic;
+use palpate_realtime::give_large_blocks_back;
 use palpate_scene::Scene;
 use sd_notify::NotifyState;
 use std::{io::Write as _, process::ExitCode, sync::Arc};
@@ -37,6 +38,7 @@ pub fn run(args: &ServeArgs) -> miette::Result<ExitCode> {
 pub fn run_with(args: &ServeArgs, runner: Runner) -> miette::Result<ExitCode> {
     telemetry::init();
     let mut config = args.config()?;
+    give_large_blocks_back();
     config.bounds.connections = config.bounds.connections.min(descriptors::raise());
     let mut bar = Progress::new(&args.scene);
     if let Some(autosave) = &config.autosave {
