@@ -9,6 +9,7 @@ use palpate_physics::{
     material::Law,
 };
 use palpate_scene::wording::short;
+use serde::{Deserialize, Serialize};
 
 /// What to take instead of a law that bears less the more it is pressed.
 pub const INSTEAD: Law = Law::StableNeoHookean;
@@ -25,7 +26,7 @@ fn near(model: &Model, tet: usize) -> String {
 }
 
 /// The most that was seen of a run, or of one state.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     lowest: Option<(VolumeRatio, f64)>,
     pressed: Option<(Pressed, f64)>,

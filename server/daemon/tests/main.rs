@@ -17,6 +17,7 @@ mod offline;
 mod particles;
 mod ramps;
 mod refined;
+mod resumed;
 mod seed;
 mod session;
 mod springs;

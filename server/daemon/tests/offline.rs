@@ -39,35 +39,35 @@ duration_s = 1.5
 frame_interval_s = 0.5
 "#;
 
-fn palpated(arguments: &[&str]) -> Output {
+pub(crate) fn palpated(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_palpated")).args(arguments).output().unwrap()
 }
 
-fn succeeds(arguments: &[&str]) -> String {
+pub(crate) fn succeeds(arguments: &[&str]) -> String {
     let output = palpated(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
 /// What it prints on standard error, on one line and without the frame miette draws.
-fn fails(arguments: &[&str]) -> String {
+pub(crate) fn fails(arguments: &[&str]) -> String {
     let output = palpated(arguments);
     assert_eq!(output.status.code(), Some(1), "{arguments:?}");
     let text = String::from_utf8(output.stderr).unwrap();
     text.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }
 
-fn beam(folder: &Path) -> String {
+pub(crate) fn beam(folder: &Path) -> String {
     let path = folder.join("beam.toml");
     fs::write(&path, BEAM).unwrap();
     path.to_str().unwrap().to_owned()
 }
 
-fn summary(out: &Path) -> Value {
+pub(crate) fn summary(out: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap()
 }
 
-fn examples() -> PathBuf {
+pub(crate) fn examples() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../deploy/scenes")
 }
 

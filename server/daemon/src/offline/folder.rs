@@ -11,10 +11,13 @@ pub(super) const PROBES: &str = "probes.csv";
 pub(super) const SUMMARY: &str = "summary.json";
 pub(super) const INDEX: &str = "frames.pvd";
 pub(super) const FRAMES: &str = "frames";
+pub(super) const CHECKPOINT: &str = "checkpoint.bin";
 
 #[derive(Debug, Error, Diagnostic)]
 #[error("the folder {folder} is not empty (it holds {example})")]
-#[diagnostic(help("choose another folder with --out, or add --force to replace the results of an earlier run in it"))]
+#[diagnostic(help(
+    "choose another folder with --out, or add --force to replace the results of an earlier run in it; a run that was interrupted there goes on with `palpated simulate SCENE --out FOLDER --resume`"
+))]
 struct NotEmpty {
     folder: String,
     example: String,
@@ -51,7 +54,7 @@ pub(super) fn prepare(folder: &Path, force: bool) -> miette::Result<PathBuf> {
 }
 
 fn remove_results(folder: &Path) -> std::io::Result<()> {
-    for name in [PROBES, SUMMARY, INDEX] {
+    for name in [PROBES, SUMMARY, INDEX, CHECKPOINT] {
         let path = folder.join(name);
         if path.is_file() {
             fs::remove_file(path)?;

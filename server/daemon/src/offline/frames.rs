@@ -10,32 +10,41 @@ use std::path::{Path, PathBuf};
 pub(super) struct Frames {
     folder: PathBuf,
     index: PvdIndex,
-    count: usize,
+    times_s: Vec<f64>,
     region: Vec<u32>,
     displacement_m: Vec<DVec3>,
     /// Positions (m) of the skin of a body with particles.
     skin_m: Vec<DVec3>,
 }
 
-fn add(folder: &Path, index: &mut PvdIndex, count: &mut usize, frame: &VtuFrame<'_>) -> miette::Result<()> {
-    let name = format!("{}/frame-{count:06}.vtu", folder::FRAMES);
+fn name_of(frame: usize) -> String {
+    format!("{}/frame-{frame:06}.vtu", folder::FRAMES)
+}
+
+fn add(folder: &Path, index: &mut PvdIndex, times_s: &mut Vec<f64>, frame: &VtuFrame<'_>) -> miette::Result<()> {
+    let name = name_of(times_s.len());
     write_vtu(&folder.join(&name), frame)?;
-    index.add(frame.time_s.unwrap_or_default(), &name)?;
-    *count += 1;
+    let time_s = frame.time_s.unwrap_or_default();
+    index.add(time_s, &name)?;
+    times_s.push(time_s);
     Ok(())
 }
 
 impl Frames {
-    /// Frames go to `frames/` in the output folder.
-    pub(super) fn new(out: &Path, model: &Model) -> miette::Result<Self> {
+    /// Frames go to `frames/` in the output folder, behind those of these times (s) that are there already.
+    pub(super) fn new(out: &Path, model: &Model, there_s: &[f64]) -> miette::Result<Self> {
         let folder = out.join(folder::FRAMES);
         std::fs::create_dir_all(&folder)
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
         let regions = model.body().filling_tets().map_or(&[][..], |solid| &solid.tet_region);
         let region = regions.iter().map(|&region| u32::from(region)).collect();
-        let index = PvdIndex::create(&out.join(folder::INDEX))?;
-        Ok(Self { folder: out.to_path_buf(), index, count: 0, region, displacement_m: Vec::new(), skin_m: Vec::new() })
+        let mut index = PvdIndex::create(&out.join(folder::INDEX))?;
+        for (frame, &time_s) in there_s.iter().enumerate() {
+            index.add(time_s, &name_of(frame))?;
+        }
+        let times_s = there_s.to_vec();
+        Ok(Self { folder: out.to_path_buf(), index, times_s, region, displacement_m: Vec::new(), skin_m: Vec::new() })
     }
 
     /// Writes a frame and adds it to the index, so that an interrupted run can be opened.
@@ -54,7 +63,7 @@ impl Frames {
             cell_data: &[Field { name: "material", values: Values::Integers(&self.region) }],
             time_s: Some(time_s),
         };
-        add(&self.folder, &mut self.index, &mut self.count, &frame)
+        add(&self.folder, &mut self.index, &mut self.times_s, &frame)
     }
 
     /// Of a body with particles, its skin; of springs, the surface refined everywhere.
@@ -70,11 +79,16 @@ impl Frames {
             cell_data: &[],
             time_s: Some(time_s),
         };
-        add(&self.folder, &mut self.index, &mut self.count, &frame)
+        add(&self.folder, &mut self.index, &mut self.times_s, &frame)
     }
 
     /// Frames so far.
     pub(super) fn count(&self) -> usize {
-        self.count
+        self.times_s.len()
+    }
+
+    /// Their times (s).
+    pub(super) fn times_s(&self) -> &[f64] {
+        &self.times_s
     }
 }

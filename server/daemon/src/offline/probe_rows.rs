@@ -7,6 +7,7 @@ use palpate_scene::{
     Probe,
     probes::{MAX_COLUMNS, Measure},
 };
+use serde::{Deserialize, Serialize};
 use std::{io::Write, path::Path};
 
 /// Evaluates all probes into one row, and writes it if there is a file.
@@ -19,12 +20,22 @@ pub(super) struct ProbeRows<'s> {
 }
 
 /// The row in which something was largest.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Peak {
     /// Largest magnitude, or for the volume ratio smallest value.
     pub(super) value: f64,
     /// When (s).
     pub(super) time_s: f64,
+}
+
+/// How far rows had come.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct RowsMark {
+    /// Length of the file, if there is one.
+    bytes: u64,
+    count: u64,
+    row: Vec<f64>,
+    peaks: Vec<Peak>,
 }
 
 /// What a probe's peaks are of: the length of a vector, or each value.
@@ -51,6 +62,23 @@ impl<'s> ProbeRows<'s> {
         let peaks = probes.iter().map(|probe| peaks_of(probe).len()).sum();
         let none = Peak { value: 0.0, time_s: 0.0 };
         Ok(Self { probes, row: vec![0.0; columns], peaks: vec![none; peaks], file, count: 0 })
+    }
+
+    /// Goes on behind a mark.
+    pub(super) fn resume(probes: &'s [Probe], path: &Path, mark: &RowsMark) -> miette::Result<Self> {
+        let without_file = Self::new(probes, None)?;
+        let file = WholeRows::resume(path, mark.bytes)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot go on with {}", path.display()))?;
+        let RowsMark { count, row, peaks, .. } = mark.clone();
+        Ok(Self { row, peaks, file: Some(file), count, ..without_file })
+    }
+
+    /// How far they are. Everything until here is with the disk then.
+    pub(super) fn mark(&mut self) -> miette::Result<RowsMark> {
+        let bytes = self.file.as_mut().map_or(Ok(0), WholeRows::length);
+        let bytes = bytes.into_diagnostic().wrap_err("cannot write probes.csv")?;
+        Ok(RowsMark { bytes, count: self.count, row: self.row.clone(), peaks: self.peaks.clone() })
     }
 
     /// Evaluates at a state; `reactions_n` is the force (N) that holds each node.

@@ -1,12 +1,14 @@
 //! `palpated simulate`: a scene headless, as fast as it goes, the same bits every time.
 use super::{
     args::{OutputArgs, positive},
+    checkpoint::{Checkpoint, Checkpoints},
     exit::{CODES, Untrusted},
     folder,
     frames::Frames,
     interrupt::Interrupt,
     load,
-    probe_rows::ProbeRows,
+    plan::{FrameCount, FrameRule, Plan, in_ticks},
+    probe_rows::{ProbeRows, RowsMark},
     summary::{Ending, PeakNumbers, Percentiles, Summary, TimeNumbers},
     walls::WallNumbers,
 };
@@ -16,14 +18,15 @@ use hdrhistogram::Histogram;
 use miette::IntoDiagnostic;
 use palpate_physics::{Model, Scratch, State, StepReport, TickInput, contact::ToolTarget, step, world::strained_in};
 use palpate_scene::{Probe, Scene, wording::short};
-use std::{process::ExitCode, time::Instant};
+use std::{path::Path, process::ExitCode, time::Instant};
 
 /// Flags of `palpated simulate`.
 #[derive(Debug, Clone, clap::Args)]
 #[command(after_help = format!("Examples:\n  \
     palpated simulate ventricle                      print what it did\n  \
     palpated simulate ventricle --out run            and keep probes.csv, frames.pvd (open it in ParaView), summary.json\n  \
-    palpated simulate my.toml --out run --frames none --duration-s 10\n\n\
+    palpated simulate my.toml --out run --frames none --duration-s 10\n  \
+    palpated simulate my.toml --out run --resume     go on where that was interrupted, or its machine died\n\n\
     Nothing in a run is random: two runs of one scene give the same bits.\n\n{CODES}"))]
 pub struct SimulateArgs {
     #[command(flatten)]
@@ -34,33 +37,19 @@ pub struct SimulateArgs {
     /// Number of frames over the whole run, or "none"; by default the scene's interval decides
     #[arg(long, value_name = "N|none", requires = "out")]
     frames: Option<FrameCount>,
+    /// Go on with the run in the folder: with what it wrote until its last checkpoint, and to the same bits as without a break
+    #[arg(long, requires = "out", conflicts_with = "force")]
+    resume: bool,
+    /// Wall time in seconds between checkpoints in the folder, from which --resume goes on; Ctrl-C writes one as well
+    #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = positive)]
+    checkpoint_every_s: f64,
 }
 
+/// How a run ended that may go on.
+const INTERRUPTED: &str = "interrupted";
 /// Elements that are inside out, or pressed beyond what their law is made for, are looked for so often (s), wherever a tick
 /// had to be repeated, with every sample of a probe that tells of them, and at the end.
 const LOOK_EVERY_S: f64 = 0.01;
-
-/// How many frames a run writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameCount {
-    /// None at all.
-    None,
-    /// This many, evenly over the run, from its start to its end.
-    Some(u32),
-}
-
-impl std::str::FromStr for FrameCount {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "none" => Ok(Self::None),
-            _ => match text.parse() {
-                Ok(count) if count > 1 => Ok(Self::Some(count)),
-                _ => Err("give a whole number of frames, 2 or more, or \"none\"".into()),
-            },
-        }
-    }
-}
 
 /// Runs the command.
 ///
@@ -70,7 +59,6 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     let output = &args.output;
     let mut scene = load::load_with_warnings(&output.scene)?;
     let model = load::build_with_warnings(&mut scene)?;
-    let out = output.out.as_deref().map(|out| folder::prepare(out, output.force)).transpose()?;
     let ticks = |time_s: f64| in_ticks(time_s, &model);
     let plan = Plan::new(
         ticks(args.duration_s.unwrap_or(scene.output.duration_s)),
@@ -78,14 +66,27 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
         ticks(scene.output.frame_interval_s),
         args.frames,
     );
-    let mut rows = ProbeRows::new(&scene.probes, out.as_ref().map(|out| out.join(folder::PROBES)).as_deref())?;
+    let mut checkpoints = Checkpoints::new(output, args.checkpoint_every_s);
+    let begun = if args.resume { checkpoints.read(&plan, &model)? } else { None };
+    let out = match (output.out.as_deref(), &begun) {
+        (Some(out), None) => Some(folder::prepare(out, output.force)?),
+        (out, _) => out.map(Path::to_path_buf),
+    };
+    let path = out.as_ref().map(|out| out.join(folder::PROBES));
+    let mut rows = match (&path, &begun) {
+        (Some(path), Some(begun)) => ProbeRows::resume(&scene.probes, path, &begun.rows)?,
+        _ => ProbeRows::new(&scene.probes, path.as_deref())?,
+    };
     let mut frames = match (&out, plan.frames) {
-        (Some(out), FrameRule::Every(_) | FrameRule::Count(_)) => Some(Frames::new(out, &model)?),
+        (Some(out), FrameRule::Every(_) | FrameRule::Count(_)) => {
+            Some(Frames::new(out, &model, begun.as_ref().map_or(&[], |begun| &begun.frame_times_s))?)
+        }
         _ => None,
     };
     let mut run = Run::new(&scene, &model)?;
+    let resumed_s = begun.map(|begun| run.go_on(begun));
     let started = Instant::now();
-    let ended_by = run.all(&plan, &mut rows, frames.as_mut())?;
+    let ended_by = run.all(&plan, &mut rows, frames.as_mut(), &mut checkpoints)?;
     rows.flush()?;
     let ending = Ending {
         command: "simulate",
@@ -96,6 +97,7 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     };
     let mut summary = Summary::new(&scene, &model, &run.state, &rows, &ending);
     summary.time = Some(run.cost());
+    summary.resumed_at_s = resumed_s;
     summary.walls = (run.walls.ticks > 0).then_some(run.walls);
     for slipped in run.slipped() {
         eprintln!("warning: {slipped}");
@@ -108,52 +110,11 @@ pub fn run(args: &SimulateArgs) -> miette::Result<ExitCode> {
     if let Some(out) = &out {
         summary.write(out)?;
     }
+    if ended_by != INTERRUPTED {
+        checkpoints.remove();
+    }
     summary.print(output.json, out.as_deref())?;
     Ok(run.untrusted(summary.min_volume_ratio).map_or(ExitCode::SUCCESS, Untrusted::told))
-}
-
-/// What to do at which tick.
-struct Plan {
-    ticks: u64,
-    sample_every: u64,
-    frames: FrameRule,
-}
-
-/// When a frame is due.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum FrameRule {
-    Never,
-    Every(u64),
-    /// This many over the run, at least 2.
-    Count(u64),
-}
-
-/// Ticks in a time, at least one.
-fn in_ticks(time_s: f64, model: &Model) -> u64 {
-    ((time_s / model.settings().tick_period_s).round() as u64).max(1)
-}
-
-impl Plan {
-    fn new(ticks: u64, sample_every: u64, frame_every: u64, frames: Option<FrameCount>) -> Self {
-        let frames = match frames {
-            Some(FrameCount::None) => FrameRule::Never,
-            // There are no more states than ticks and the start.
-            Some(FrameCount::Some(count)) => FrameRule::Count(u64::from(count).min(ticks.saturating_add(1))),
-            None => FrameRule::Every(frame_every),
-        };
-        Self { ticks, sample_every, frames }
-    }
-
-    /// Whether the state after a tick is a frame, `written` being there already. The last state always is.
-    fn frame_is_due(&self, tick: u64, written: u64, last: bool) -> bool {
-        match self.frames {
-            FrameRule::Never => false,
-            FrameRule::Every(ticks) => last || tick.is_multiple_of(ticks),
-            FrameRule::Count(count) => {
-                last || tick as u128 >= u128::from(written) * u128::from(self.ticks) / u128::from(count - 1)
-            }
-        }
-    }
 }
 
 /// A running simulation with its buffers.
@@ -177,6 +138,8 @@ pub(super) struct Run<'s> {
     slips: Vec<(f64, f64)>,
     seen: Seen,
     walls: WallNumbers,
+    /// The tick that [`Self::all`] begins with.
+    next_tick: u64,
 }
 
 impl<'s> Run<'s> {
@@ -199,7 +162,32 @@ impl<'s> Run<'s> {
             slips: vec![(0.0, 0.0); scene.model.tools.len()],
             seen: Seen::default(),
             walls: WallNumbers::default(),
+            next_tick: 0,
         })
+    }
+
+    /// Goes on from a checkpoint; the time (s) of it. What ticks cost is counted from here on.
+    fn go_on(&mut self, begun: Checkpoint) -> f64 {
+        self.state = begun.state;
+        self.next_tick = self.state.mechanical.tick + 1;
+        self.most_awake = begun.most_awake;
+        self.slips = begun.slips;
+        self.seen = begun.seen;
+        self.walls = begun.walls;
+        self.state.time_s(self.model)
+    }
+
+    fn checkpoint(&self, plan: &Plan, rows: RowsMark, frame_times_s: &[f64]) -> Checkpoint {
+        Checkpoint {
+            plan: plan.clone(),
+            state: self.state.clone(),
+            rows,
+            frame_times_s: frame_times_s.to_vec(),
+            most_awake: self.most_awake,
+            slips: self.slips.clone(),
+            seen: self.seen,
+            walls: self.walls,
+        }
     }
 
     /// Runs to the end of the plan, and says what ended it.
@@ -208,30 +196,44 @@ impl<'s> Run<'s> {
         plan: &Plan,
         rows: &mut ProbeRows<'_>,
         mut frames: Option<&mut Frames>,
+        checkpoints: &mut Checkpoints,
     ) -> miette::Result<&'static str> {
         let interrupt = Interrupt::listen();
         let mut bar = Progress::new(&self.scene.name);
         let mut ended_by = "duration";
         let look_every = in_ticks(LOOK_EVERY_S, self.model);
         let samples_tell = self.scene.probes.iter().any(Probe::tells_of_inversion);
-        for tick in 0..=plan.ticks {
+        let first = self.next_tick;
+        for tick in first..=plan.ticks {
             let repeated = tick > 0 && self.tick().repeated > 0;
             let time_s = self.state.time_s(self.model);
             if self.state.quarantine.is_some() {
                 ended_by = "quarantined";
             } else if tick < plan.ticks && interrupt.is_set() {
-                ended_by = "interrupted";
+                ended_by = INTERRUPTED;
             }
             let last = tick == plan.ticks || ended_by != "duration";
-            let sampled = last || tick.is_multiple_of(plan.sample_every);
-            if repeated || tick.is_multiple_of(look_every) || (sampled && samples_tell) || last {
+            let due = tick.is_multiple_of(plan.sample_every);
+            if repeated || tick.is_multiple_of(look_every) || ((due || last) && samples_tell) || last {
                 self.look(time_s);
             }
-            if sampled {
+            if due {
                 rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
             }
-            if let Some(frames) = &mut frames
-                && plan.frame_is_due(tick, frames.count() as u64, last)
+            let written = frames.as_ref().map_or(0, |frames| frames.count() as u64);
+            let frame_is_due = plan.frame_is_due(tick, written, false);
+            if let (Some(frames), true) = (&mut frames, frame_is_due) {
+                frames.write(time_s, self.model, &self.state)?;
+            }
+            // Before what only the last state of a run that is broken off writes.
+            if ended_by == INTERRUPTED || (!last && checkpoints.are_due()) {
+                let frame_times_s = frames.as_ref().map_or(&[][..], |frames| frames.times_s());
+                checkpoints.write(&self.checkpoint(plan, rows.mark()?, frame_times_s), self.model)?;
+            }
+            if last && !due {
+                rows.sample(time_s, self.model, &self.state, self.scratch.reactions_n())?;
+            }
+            if let (Some(frames), true) = (&mut frames, last && !frame_is_due && plan.frame_is_due(tick, written, true))
             {
                 frames.write(time_s, self.model, &self.state)?;
             }
@@ -384,47 +386,5 @@ fn percentiles_us(wall_ns: &Histogram<u64>) -> Percentiles {
         p50: us(wall_ns.value_at_quantile(0.5)),
         p99: us(wall_ns.value_at_quantile(0.99)),
         max: us(wall_ns.max()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Ticks whose states are frames, when the run ends after `ends`.
-    fn frames(plan: &Plan, ends: u64) -> Vec<u64> {
-        let mut due = Vec::new();
-        for tick in 0..=ends {
-            if plan.frame_is_due(tick, due.len() as u64, tick == ends) {
-                due.push(tick);
-            }
-        }
-        due
-    }
-
-    #[test]
-    fn the_wanted_number_of_frames_from_the_start_to_the_end() {
-        let plan = |ticks, count| Plan::new(ticks, 1, 1, Some(FrameCount::Some(count)));
-        assert_eq!(frames(&plan(10, 2), 10), [0, 10]);
-        assert_eq!(frames(&plan(10, 4), 10), [0, 3, 6, 10]);
-        for count in 2..=101 {
-            assert_eq!(frames(&plan(100, count), 100).len(), count as usize);
-        }
-    }
-
-    #[test]
-    fn more_frames_than_ticks_are_one_for_every_state() {
-        assert_eq!(frames(&Plan::new(3, 1, 1, Some(FrameCount::Some(1000))), 3), [0, 1, 2, 3]);
-        assert_eq!(frames(&Plan::new(1, 1, 1, Some(FrameCount::Some(u32::MAX))), 1), [0, 1]);
-    }
-
-    /// With an interval that does not divide the run, its end was in no frame.
-    #[test]
-    fn the_last_state_is_a_frame_whenever_the_run_ends() {
-        assert_eq!(frames(&Plan::new(10, 1, 4, None), 10), [0, 4, 8, 10]);
-        assert_eq!(frames(&Plan::new(10, 1, 5, None), 10), [0, 5, 10]);
-        assert_eq!(frames(&Plan::new(10, 1, 4, None), 7), [0, 4, 7]);
-        assert_eq!(frames(&Plan::new(10, 1, 4, Some(FrameCount::Some(3))), 7), [0, 5, 7]);
-        assert!(frames(&Plan::new(10, 1, 4, Some(FrameCount::None)), 10).is_empty());
     }
 }

@@ -18,7 +18,11 @@ pub(super) struct Summary {
     /// `unstable` or `unbalanced`.
     pub(super) ended_by: &'static str,
     pub(super) simulated_s: f64,
+    /// Since the run began, or was resumed.
     pub(super) wall_s: f64,
+    /// Where the run was resumed last; what ticks cost is counted from there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) resumed_at_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) time: Option<TimeNumbers>,
     /// Where walls of the body met.
@@ -221,6 +225,7 @@ impl Summary {
             ended_by: ending.by,
             simulated_s: ending.simulated_s,
             wall_s: ending.wall_s,
+            resumed_at_s: None,
             time: None,
             walls: None,
             solve: None,

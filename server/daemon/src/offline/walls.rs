@@ -1,10 +1,10 @@
 //! What `simulate` tells of walls of the body that met.
 use palpate_physics::contact::MeetingWalls;
 use palpate_scene::wording::{counted, short};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Walls of the body that met in the ticks of a run.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct WallNumbers {
     /// Ticks at whose end they did.
     pub(super) ticks: u64,

@@ -1,7 +1,7 @@
 //! A table that grows by whole rows: whoever kills the program, or fills the disk, leaves no row in part.
 use std::{
     fs::File,
-    io::{self, Seek as _, Write as _},
+    io::{self, Seek as _, SeekFrom, Write as _},
     path::Path,
     time::{Duration, Instant},
 };
@@ -23,6 +23,24 @@ impl WholeRows {
     /// A new file, in the place of what is there.
     pub(super) fn create(path: &Path) -> io::Result<Self> {
         Ok(Self::of(File::create(path)?))
+    }
+
+    /// Goes on behind the first `length` bytes of a file; what is there after them goes.
+    pub(super) fn resume(path: &Path, length: u64) -> io::Result<Self> {
+        let mut file = File::options().write(true).open(path)?;
+        if file.metadata()?.len() < length {
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "it is shorter than it was at the checkpoint"));
+        }
+        file.set_len(length)?;
+        file.seek(SeekFrom::End(0))?;
+        Ok(Self::of(file))
+    }
+
+    /// How long (bytes) the file is once all rows so far are with the disk, to which they are handed here.
+    pub(super) fn length(&mut self) -> io::Result<u64> {
+        self.flush()?;
+        self.file.sync_data()?;
+        self.file.stream_position()
     }
 
     fn of(file: File) -> Self {

@@ -5,6 +5,7 @@
 use crate::linalg::tensor::outer;
 use crate::material::{Material, viscous};
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// What the rest state fixes for one tet.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +71,7 @@ impl RestTet {
 }
 
 /// The smallest `J = det F` of a body.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct VolumeRatio {
     /// `J`; below zero: inverted.
     pub ratio: f64,

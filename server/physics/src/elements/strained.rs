@@ -6,9 +6,10 @@ use crate::{
     material::Law,
 };
 use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
 
 /// An element that is pressed beyond what its law is made for ([`Law::weakens_below`]).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pressed {
     /// Its least principal stretch: deformed over rest length, 1 at rest.
     pub stretch: f64,

@@ -6,7 +6,7 @@
 macro_rules! laws {
     ($($(#[$attribute:meta])* $module:ident::$law:ident),+ $(,)?) => {
         /// Which law a material obeys.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
         pub enum Law {
             $(#[doc = concat!("The law of [`", stringify!($module), "::", stringify!($law), "`].")] $(#[$attribute])* $law),+
         }
