@@ -25,6 +25,7 @@ use tokio::{
     time,
 };
 use tokio_util::sync::CancellationToken;
+use tracing::Instrument as _;
 
 /// Beyond the ramp, how long the servo may take to stop.
 const STOP_MARGIN: Duration = Duration::from_secs(1);
@@ -163,7 +164,7 @@ pub async fn run_with(config: &Config, shutdown: CancellationToken, handle: Hand
             Ok(Uplink::new(settings, source, commands, shared, end))
         }
     };
-    let mut uplink = start_uplink(uplink, settings.measures)?;
+    let mut uplink = start_uplink(uplink, &settings.uplink.device_name, settings.measures)?;
     let mut watcher = Watcher::new(&settings);
     let mut every = time::interval(WATCH_PERIOD);
     let outcome = loop {
@@ -225,12 +226,14 @@ fn remember(latch: Option<&mut Latch>, shared: &Shared) {
 /// what else this one does, do not delay it. Where that is refused, the servo has said so. What comes back is how the stream ended.
 fn start_uplink(
     make: impl FnOnce() -> std::io::Result<Uplink> + Send + 'static,
+    device_name: &str,
     of_servo: OsMeasures,
 ) -> Result<oneshot::Receiver<Result<(), BridgeError>>, BridgeError> {
     let system = |source| BridgeError::System { what: "start the thread of the stream", source };
     let measures = of_servo.of_stream();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(system)?;
     let (tell, ended) = oneshot::channel();
+    let span = tracing::info_span!("arm", name = device_name);
     let body = move || {
         let granted = measures.apply();
         for note in granted.notes.iter().filter(|note| note.granted) {
@@ -238,7 +241,7 @@ fn start_uplink(
         }
         let run = async {
             match make() {
-                Ok(uplink) => uplink.run().await,
+                Ok(uplink) => uplink.run().instrument(span).await,
                 Err(source) => Err(BridgeError::System { what: "watch an eventfd", source }),
             }
         };

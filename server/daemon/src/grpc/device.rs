@@ -5,6 +5,7 @@ use super::{
     downlink::{Attachment, Taken},
 };
 use crate::{
+    doors::refusals::Peer,
     session::{ActiveSession, Daemon, DeviceRecord, Dismissal, ToolSeat},
     sim::tool::ArmLimits,
     who::gate::Expiry,
@@ -18,6 +19,7 @@ use palpate_proto::{
 use std::{pin::Pin, sync::Arc, time::Duration};
 use tokio::time::timeout;
 use tonic::{Request, Response, Status, Streaming};
+use tracing::{Instrument as _, Span, field::Empty};
 
 /// How long a device may take to say hello.
 const HELLO_WITHIN: Duration = Duration::from_secs(5);
@@ -35,20 +37,23 @@ impl Device for DeviceService {
 
     async fn attach(&self, request: Request<Streaming<v1::DeviceUp>>) -> Result<Response<Self::AttachStream>, Status> {
         let expiry = request.extensions().get::<Expiry>().cloned();
-        let start = Phase::Hello(Arc::clone(&self.daemon), Box::new(request.into_inner()), expiry);
+        let peer = request.extensions().get::<Peer>().map(tracing::field::display);
+        // What a tool and a session are called is known with the hello.
+        let span = tracing::info_span!("arm", peer, device = Empty, tool = Empty, session = Empty);
+        let start = Phase::Hello(Arc::clone(&self.daemon), Box::new(request.into_inner()), expiry, span);
         Ok(Response::new(Box::pin(stream::unfold(start, next))))
     }
 }
 
 enum Phase {
-    Hello(Arc<Daemon>, Box<Streaming<v1::DeviceUp>>, Option<Expiry>),
+    Hello(Arc<Daemon>, Box<Streaming<v1::DeviceUp>>, Option<Expiry>, Span),
     Live(Box<Attachment>),
     Over,
 }
 
 async fn next(phase: Phase) -> Option<(Result<v1::DeviceDown, Status>, Phase)> {
     let (result, phase) = match phase {
-        Phase::Hello(daemon, messages, expiry) => match begin(daemon, *messages, expiry).await {
+        Phase::Hello(daemon, messages, expiry, span) => match begin(daemon, *messages, expiry).instrument(span).await {
             Ok((welcome, attachment)) => (Ok(Message::Welcome(welcome)), Phase::Live(Box::new(attachment))),
             Err(status) => (Err(status), Phase::Over),
         },
@@ -102,9 +107,11 @@ async fn begin(
     end.shared.set_stale_after_s(patience.stale_after_s);
     end.shared.attach(attachment, max_force_n);
     let welcome = welcome(&daemon, &session, tool, (max_force_n, max_torque_nm), patience);
-    tracing::info!(device = hello.device_name, tool = seat.name, "device attached");
+    let span = Span::current();
+    span.record("device", &hello.device_name).record("tool", &seat.name).record("session", &session.id);
+    tracing::info!("device attached");
     let lease = Duration::from_secs_f64(patience.lease_s);
-    let taken = Taken { session, tool, number: attachment, record, end, lease };
+    let taken = Taken { session, tool, number: attachment, record, end, lease, span };
     Ok((welcome, Attachment::live(daemon, taken, messages)))
 }
 

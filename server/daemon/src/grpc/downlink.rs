@@ -21,6 +21,7 @@ use tokio::{
 };
 use tokio_util::sync::CancellationToken;
 use tonic::{Status, Streaming};
+use tracing::{Instrument as _, Span};
 use triple_buffer::Input;
 
 /// How long a stream waits for the loop to bring the force to zero before it does so itself.
@@ -43,6 +44,8 @@ pub struct Taken {
     pub end: ToolEnd,
     /// Time without a sample after which it is taken from the device.
     pub lease: Duration,
+    /// Of what is logged of the device.
+    pub span: Span,
 }
 
 /// What a device is told when the daemon ends its attachment.
@@ -86,6 +89,7 @@ pub struct Attachment {
     uplink: JoinHandle<Ended>,
     /// Comes when the way up has ended.
     samples: Option<oneshot::Receiver<Input<Option<DeviceInput>>>>,
+    span: Span,
     over: CancellationToken,
     faults: mpsc::Receiver<v1::DeviceFault>,
     news: News,
@@ -126,7 +130,7 @@ enum End {
 impl Attachment {
     /// Begins both ways.
     pub fn live(daemon: Arc<Daemon>, taken: Taken, messages: Streaming<v1::DeviceUp>) -> Self {
-        let Taken { session, tool, number, record, end, lease } = taken;
+        let Taken { session, tool, number, record, end, lease, span } = taken;
         let over = CancellationToken::new();
         let (fault_in, faults) = mpsc::channel(FAULTS_WAITING);
         // The way up has the real slot; what stands in its place is never read.
@@ -145,7 +149,7 @@ impl Attachment {
             lease,
             of_latches: Sparing::default(),
         };
-        let uplink = tokio::spawn(uplink.run(over.clone().drop_guard()));
+        let uplink = tokio::spawn(uplink.run(over.clone().drop_guard()).instrument(span.clone()));
         Self {
             daemon,
             session,
@@ -155,6 +159,7 @@ impl Attachment {
             end: Some(ToolEnd { samples: placeholder, outputs, ear, shared }),
             uplink,
             samples: Some(samples),
+            span,
             over,
             faults,
             news: News::new(limits),
@@ -166,6 +171,11 @@ impl Attachment {
 
     /// The next message, `None` when the device has gone.
     pub async fn next(&mut self) -> Option<Result<Message, Status>> {
+        let span = self.span.clone();
+        self.next_of_all().instrument(span).await
+    }
+
+    async fn next_of_all(&mut self) -> Option<Result<Message, Status>> {
         if let Stage::Live = self.stage {
             let why = match self.next_of_live().await {
                 Ok(message) => return Some(Ok(message)),
@@ -295,7 +305,7 @@ impl Attachment {
 impl Drop for Attachment {
     fn drop(&mut self) {
         self.over.cancel();
-        tracing::info!(device = self.record.name, tool = self.session.tools[self.tool].name, "device detached");
+        self.span.in_scope(|| tracing::info!("device detached"));
         let (Some(end), Some(samples)) = (self.end.take(), self.samples.take()) else { return };
         end.shared.detach();
         let (session, tool) = (Arc::clone(&self.session), self.tool);

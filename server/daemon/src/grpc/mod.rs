@@ -50,7 +50,7 @@ pub async fn routes(
     let web = GrpcWebLayer::new();
     let device = DeviceServer::new(device::DeviceService { daemon: Arc::clone(daemon) })
         .max_decoding_message_size(MAX_SMALL_BYTES);
-    let surface = SurfaceServer::new(surface::SurfaceService { daemon: Arc::clone(daemon) })
+    let surface = SurfaceServer::new(surface::SurfaceService { daemon: Arc::clone(daemon), said: Arc::default() })
         .max_decoding_message_size(MAX_SMALL_BYTES);
     let session = SessionServer::new(session::SessionService { daemon: Arc::clone(daemon), said: Arc::default() })
         .max_decoding_message_size(MAX_SNAPSHOT_BYTES)

@@ -1,7 +1,7 @@
 //! `palpate.v1.Session`.
 use super::{convert, current_session, detach};
 use crate::{
-    doors::{answer::Kept, refusals::Peer},
+    doors::answer::Kept,
     kept::folder::Slot,
     load,
     session::{ActiveSession, Daemon, Dismissal, prepare},
@@ -21,6 +21,7 @@ use palpate_proto::{
 use std::sync::Arc;
 use tokio::sync::OwnedSemaphorePermit;
 use tonic::{Request, Response, Status};
+use tracing::Instrument as _;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -43,13 +44,9 @@ pub struct Said {
     detach: Sparing,
 }
 
-/// Says who gave an order; `times`: such orders since the last line.
-fn say<M>(line: &Sparing, request: &Request<M>, order: &'static str) {
-    line.say(|times| {
-        let peer = request.extensions().get::<Peer>().map(ToString::to_string);
-        let who = caller(request);
-        tracing::info!(peer, who = who.name(), order, times, "an order has come");
-    });
+/// Says that an order has come, within the span that says from whom; `times`: such orders since the last line.
+fn say(line: &Sparing, order: &'static str) {
+    line.say(|times| tracing::info!(order, times, "an order has come"));
 }
 
 /// Who gave it: nobody that is known, where the gate did not say.
@@ -102,13 +99,13 @@ impl SessionService {
             .try_lock_owned()
             .map_err(|_| Status::aborted("another scene is being loaded: try again"))?;
         let daemon = Arc::clone(&self.daemon);
-        let loading = tokio::spawn(async move {
+        let load = async move {
             let _one_at_a_time = one_at_a_time;
             let session = replace_scene(&daemon, source).await?;
             tracing::info!(scene = session.scene_name, session = session.id, "scene loaded");
             Ok(session)
-        });
-        loading.await.unwrap_or_else(|_| Err(unexpected()))
+        };
+        tokio::spawn(load.in_current_span()).await.unwrap_or_else(|_| Err(unexpected()))
     }
 }
 
@@ -170,14 +167,14 @@ impl Session for SessionService {
     }
 
     async fn reset(&self, request: Request<v1::ResetRequest>) -> Result<Response<v1::ResetResponse>, Status> {
-        say(&self.said.reset, &request, "reset");
+        say(&self.said.reset, "reset");
         let session = current_session(&self.daemon, &request.into_inner().session_id)?;
         let (_, done) = self.order(&session, Order::Reset).await?;
         Ok(Response::new(v1::ResetResponse { tick: done.tick }))
     }
 
     async fn detach(&self, request: Request<v1::DetachRequest>) -> Result<Response<v1::DetachResponse>, Status> {
-        say(&self.said.detach, &request, "detach");
+        say(&self.said.detach, "detach");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let (tool, device) = detach::driven(&session, &request.tool_name)?;
@@ -189,7 +186,7 @@ impl Session for SessionService {
     async fn pause(&self, request: Request<v1::PauseRequest>) -> Result<Response<v1::PauseResponse>, Status> {
         let pauses = request.get_ref().paused;
         let line = if pauses { &self.said.pause } else { &self.said.go_on };
-        say(line, &request, if pauses { "pause" } else { "go on" });
+        say(line, if pauses { "pause" } else { "go on" });
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let (_, done) = self.order(&session, Order::Pause(request.paused)).await?;
@@ -197,7 +194,7 @@ impl Session for SessionService {
     }
 
     async fn step(&self, request: Request<v1::StepRequest>) -> Result<Response<v1::StepResponse>, Status> {
-        say(&self.said.step, &request, "step");
+        say(&self.said.step, "step");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let ticks = convert::step_ticks(request.ticks)?;
@@ -228,7 +225,7 @@ impl Session for SessionService {
     }
 
     async fn restore(&self, request: Request<v1::RestoreRequest>) -> Result<Response<v1::RestoreResponse>, Status> {
-        say(&self.said.restore, &request, "restore");
+        say(&self.said.restore, "restore");
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;
         let (room, model) = (self.daemon.room().await.map_err(refused)?, Arc::clone(&session.model));
@@ -247,7 +244,7 @@ impl Session for SessionService {
         &self,
         request: Request<v1::InjectForcesRequest>,
     ) -> Result<Response<v1::InjectForcesResponse>, Status> {
-        say(&self.said.inject, &request, "inject forces");
+        say(&self.said.inject, "inject forces");
         let is_bounded = !caller(&request).roles().has(Role::Operator);
         let request = request.into_inner();
         let session = current_session(&self.daemon, &request.session_id)?;

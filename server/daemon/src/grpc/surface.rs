@@ -2,6 +2,7 @@
 use super::{convert, current_session};
 use crate::{
     session::Daemon,
+    sparing::Sparing,
     stream::{hub::MOST_VIEWERS, viewer::Viewer},
 };
 use futures_util::{Stream, stream};
@@ -14,6 +15,8 @@ use tonic::{Request, Response, Status};
 pub struct SurfaceService {
     /// Shared by all services.
     pub daemon: Arc<Daemon>,
+    /// Its line of the log.
+    pub said: Arc<Sparing>,
 }
 
 #[tonic::async_trait]
@@ -26,6 +29,8 @@ impl Surface for SurfaceService {
         let (rate_hz, layers) = convert::watch_request(&request, self.daemon.hub.display_rate_hz())?;
         let full = || Status::resource_exhausted(format!("{MOST_VIEWERS} viewers are watching: no more can"));
         let seat = self.daemon.hub.join(rate_hz, layers).ok_or_else(full)?;
+        self.said
+            .say(|times| tracing::info!(rate_hz, viewers = self.daemon.hub.viewer_count(), times, "a viewer has come"));
         let viewer = Viewer::new(seat, rate_hz, layers, self.daemon.stop.clone());
         let events = stream::unfold(viewer, |mut viewer| async move { viewer.next().await.map(|e| (Ok(e), viewer)) });
         Ok(Response::new(Box::pin(events)))

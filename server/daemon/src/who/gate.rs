@@ -32,6 +32,7 @@ use std::{
 use tokio::time::{Interval, MissedTickBehavior, interval};
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status};
+use tracing::Instrument as _;
 
 /// How often it is looked whether a stream's caller may go on.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -72,15 +73,16 @@ pub async fn pass(State(gate): State<Gate>, mut request: Request, next: Next) ->
             return if is_call { whole::refused(&status, request.headers()) } else { in_words(&status) };
         }
     };
+    let span = tracing::info_span!("call", rpc = path, peer = peer.map(tracing::field::display), who = caller.name());
     let Caller::Known(_) = &caller else {
         request.extensions_mut().insert(caller);
-        return next.run(request).await;
+        return next.run(request).instrument(span).await;
     };
     let expiry = CancellationToken::new();
     request.extensions_mut().insert(caller.clone());
     request.extensions_mut().insert(Expiry(expiry.clone()));
     let is_web = is_web(request.headers());
-    let response = next.run(request).await;
+    let response = next.run(request).instrument(span).await;
     let mut looks = interval(LOOK_EVERY);
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     response.map(|body| {
