@@ -84,7 +84,7 @@ pub fn run(args: &StaticArgs) -> miette::Result<ExitCode> {
     let by = untrusted.as_ref().map_or("equilibrium", Untrusted::word);
     let mut ending = Ending { command: "static", by, simulated_s: sought.time_s, wall_s, frames: 0 };
     if let Some(out) = &out {
-        let mut frames = Frames::new(out, &model)?;
+        let mut frames = Frames::new(out, &model, &[])?;
         frames.write(sought.time_s, &model, &state)?;
         ending.frames = frames.count();
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// How many frames a run writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameCount {
+pub(super) enum FrameCount {
     /// None at all.
     None,
     /// This many, evenly over the run, from its start to its end.
