@@ -50,6 +50,7 @@ pub struct Wait {
 
 /// Moves a loop's grid to where its poses are used soon after they arrive.
 #[derive(Debug, Clone)]
+#[allow(clippy::struct_field_names)] // units
 pub struct PhaseLock {
     period_ns: f64,
     last_waited_ns: Option<f64>,

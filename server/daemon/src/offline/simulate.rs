@@ -214,7 +214,7 @@ impl<'s> Run<'s> {
             }
             let last = tick == plan.ticks || ended_by != "duration";
             let due = tick.is_multiple_of(plan.sample_every);
-            if repeated || tick.is_multiple_of(look_every) || ((due || last) && samples_tell) || last {
+            if repeated || last || tick.is_multiple_of(look_every) || (due && samples_tell) {
                 self.look(time_s);
             }
             if due {
