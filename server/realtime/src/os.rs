@@ -178,12 +178,23 @@ fn pin_to(processor: usize) -> Note {
 
 fn stay_awake() -> (Note, Option<File>) {
     const PATH: &str = "/dev/cpu_dma_latency";
+    const DRIVER: &str = "/sys/devices/system/cpu/cpuidle/current_driver";
     let open = || -> io::Result<File> {
         let mut file = File::options().write(true).open(PATH)?;
         file.write_all(&0_i32.to_ne_bytes())?;
         Ok(file)
     };
+    // In many virtual machines the kernel knows of no sleep states: it halts idle processors whatever it is asked for.
+    let halts = std::fs::read_to_string(DRIVER).is_ok_and(|driver| driver.trim() == "none");
     match open() {
+        Ok(file) if halts => (
+            refused(
+                "processors: halted when they are idle, as this (virtual) machine knows no other rest, and its host may give them back \
+                 milliseconds later: see deploy/host-tuning.md"
+                    .to_owned(),
+            ),
+            Some(file),
+        ),
         Ok(file) => (granted(format!("processors: kept awake through {PATH}")), Some(file)),
         Err(error) => (
             refused(format!(

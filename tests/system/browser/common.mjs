@@ -15,7 +15,7 @@ export async function freePort() {
 
 /** `palpated serve` at a port, with the arguments given; resolves when it answers. */
 export async function startDaemon(palpated, port, ...others) {
-  const url = `http://127.0.0.1:${port}/`;
+  const url = `${others.includes("--pki") ? "https" : "http"}://127.0.0.1:${port}/`;
   const child = spawn(palpated, ["serve", ...others, "--listen", `127.0.0.1:${port}`], { stdio: ["ignore", "pipe", "pipe"] });
   let output = "";
   for (const stream of [child.stdout, child.stderr]) stream.on("data", (data) => (output += data));

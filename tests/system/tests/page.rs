@@ -47,6 +47,11 @@ fn page_shows_active_particles_when_asked() {
 }
 
 #[test]
+fn page_takes_a_token_from_its_address() {
+    drive("token.mjs", &[]);
+}
+
+#[test]
 fn page_of_others_may_do_nothing() {
     drive("strangers.mjs", &[]);
 }
